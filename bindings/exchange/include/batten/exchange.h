@@ -1,0 +1,94 @@
+/* batten-exchange: files and pictures. A library of its own; the kernel does not know that files exist.
+ *
+ * Formats are told by the extension (a trailing .gz is decompressed while reading) and, for PLY, STL and OFF, by
+ * the content. Numbers are read and written independent of the locale; every double that is written in text reads
+ * back to the same bits. Files are written beside their name and moved into place when whole: nothing half-written
+ * stays. Errors say file, line (or byte offset), what is wrong and what would be right. Declared counts are believed
+ * only as far as the file holds data. */
+#ifndef BATTEN_EXCHANGE_H
+#define BATTEN_EXCHANGE_H
+
+#include <batten/batten.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ---- points ------------------------------------------------------------------------------------- */
+
+typedef struct batten_cloud {
+  unsigned n;       /* 2 or 3 */
+  size_t count;
+  double *points;   /* [count][n] */
+  double *normals;  /* [count][n] or NULL */
+} batten_cloud;
+
+typedef struct batten_read_points_options {
+  size_t struct_size;
+  unsigned n;       /* 2 or 3; 0 = as the file has: text of 2 columns (or 4: with normals) is planar. Default 0. */
+} batten_read_points_options;
+BATTEN_API batten_read_points_options batten_read_points_options_default(void);
+
+/* XYZ, TXT, CSV (comma, semicolon, tab or blanks; # and // comments; one header line of names is recognised and may
+ * order the columns x, y, z, nx, ny, nz), PLY (ASCII, both binary orders), OBJ, OFF, STL (vertices). Free with batten_cloud_free.
+ * Fails: IO, FORMAT, INVALID (unknown extension: lists the known), NOMEM, CANCELLED. */
+BATTEN_API batten_status batten_read_points(batten_context *ctx, const char *path,
+                                            const batten_read_points_options *opt, batten_cloud *out);
+BATTEN_API void batten_cloud_free(batten_context *ctx, batten_cloud *cloud);
+
+/* ---- meshes ------------------------------------------------------------------------------------- */
+
+/* PLY, OBJ, OFF, STL (ASCII and binary; equal vertices are welded). Polygons are cut into fans. */
+BATTEN_API batten_status batten_read_mesh(batten_context *ctx, const char *path, batten_mesh **out);
+
+/* PLY (binary little endian, double), OBJ, STL (binary), OFF, VTK XML (.vtp, and .vtu) with all fields of the mesh. */
+BATTEN_API batten_status batten_write_mesh(batten_context *ctx, const batten_mesh *mesh, const char *path);
+
+/* Outlines of plane solids: .svg, .csv / .xyz / .txt (blocks of x y), .vtp, .obj (lines). */
+BATTEN_API batten_status batten_write_outline(batten_context *ctx, const batten_outline *outline, const char *path);
+
+/* ---- batten's own JSON documents ---------------------------------------------------------------- */
+
+/* {"batten": "solid", "version": 1, ...}; carriers nest, also solids in carriers. Same bits back. A callback carrier
+ * cannot be saved: INVALID. */
+BATTEN_API batten_status batten_save_solid(batten_context *ctx, const batten_solid *solid, const char *path);
+BATTEN_API batten_status batten_load_solid(batten_context *ctx, const char *path, batten_solid **out);
+/* A carrier alone: {"batten": "carrier", "version": 1, "carrier": {...}}. */
+BATTEN_API batten_status batten_save_carrier(batten_context *ctx, const batten_carrier *carrier, const char *path);
+BATTEN_API batten_status batten_load_carrier(batten_context *ctx, const char *path, batten_carrier **out);
+
+/* What a file holds, by content and extension. */
+typedef enum batten_file_kind {
+  BATTEN_FILE_UNKNOWN = 0,
+  BATTEN_FILE_POINTS,
+  BATTEN_FILE_MESH,
+  BATTEN_FILE_SOLID,
+  BATTEN_FILE_CARRIER,
+  BATTEN_FILE_DOCUMENT /* another batten JSON document */
+} batten_file_kind;
+BATTEN_API batten_status batten_file_identify(batten_context *ctx, const char *path, batten_file_kind *out);
+
+/* ---- pictures ----------------------------------------------------------------------------------- */
+
+typedef struct batten_picture_options {
+  size_t struct_size;
+  unsigned width, height;  /* pixels, 16 .. 8192. Default 1200 x 900. */
+  double azimuth_deg;      /* camera around the z axis from +x. Default 35. */
+  double elevation_deg;    /* camera above the xy plane. Default 22. */
+  size_t point_count;      /* data points drawn as dots, 0 = none */
+  const double *points;    /* [point_count][3], for outlines [point_count][2] */
+  const double *colors;    /* mesh: [V] scalar shown by colour, NULL = plain */
+  const char *title;       /* NULL = none; ASCII */
+} batten_picture_options;
+BATTEN_API batten_picture_options batten_picture_options_default(void);
+
+/* Shaded view of a mesh, or filled outline, made without a display: .png (both) or .svg (outline). */
+BATTEN_API batten_status batten_picture_mesh(batten_context *ctx, const batten_mesh *mesh,
+                                             const batten_picture_options *opt, const char *path);
+BATTEN_API batten_status batten_picture_outline(batten_context *ctx, const batten_outline *outline,
+                                                const batten_picture_options *opt, const char *path);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

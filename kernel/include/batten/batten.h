@@ -1,0 +1,15 @@
+/* batten: smooth solids and surfaces of guaranteed shape from points, contours and meshes. */
+#ifndef BATTEN_H
+#define BATTEN_H
+
+#include <batten/base.h>
+#include <batten/blas.h>
+#include <batten/carrier.h>
+#include <batten/field.h>
+#include <batten/lsq.h>
+#include <batten/mesh.h>
+#include <batten/saddle.h>
+#include <batten/solid.h>
+#include <batten/spline.h>
+
+#endif

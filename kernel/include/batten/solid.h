@@ -1,0 +1,135 @@
+/* Solids from scattered surface points: f = sign (f_c - U), f >= 0 inside.  [Savchenko et al. 1995, section 3]
+ *
+ * f_c is the carrier, U the volume spline that interpolates f_c at the points. The paper writes U - f_c with a
+ * carrier that is itself positive inside; that is positive outside, so batten turns it round. The data
+ * fix where f = 0, not its sign beside them: every fit is checked (batten_sign_check) and, where the check asks
+ * for it, cured by orienting the points and fitting again with the orientation as data. */
+#ifndef BATTEN_SOLID_H
+#define BATTEN_SOLID_H
+
+#include <batten/carrier.h>
+#include <batten/spline.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct batten_solid batten_solid;
+
+typedef enum batten_orientation {
+  BATTEN_ORIENT_AUTO = 0, /* check; cure from given normals, else from estimated ones, only where needed */
+  BATTEN_ORIENT_NEVER,    /* carrier alone; the check still tells */
+  BATTEN_ORIENT_GIVEN,    /* always use the given normals */
+  BATTEN_ORIENT_ESTIMATE  /* always estimate normals and use them */
+} batten_orientation;
+
+typedef enum batten_orient_data {
+  BATTEN_ORIENT_DATA_AUTO = 0,  /* gradients up to 2000 points, pairs above */
+  BATTEN_ORIENT_DATA_GRADIENTS, /* Hermite-Birkhoff refit with the kernel of order m+1 (r^3, r^4 ln r), no carrier */
+  BATTEN_ORIENT_DATA_PAIRS      /* refit with points off the surface, same kernel and carrier */
+} batten_orient_data;
+
+typedef enum batten_orient_method {
+  BATTEN_ORIENT_METHOD_AUTO = 0, /* least energy; above energy_points on a well-spread subset */
+  BATTEN_ORIENT_METHOD_ENERGY,   /* after Huang, Carr, Ju 2019 (VIPSS) */
+  BATTEN_ORIENT_METHOD_PLANES    /* local planes, propagated along the neighbour graph: cheap */
+} batten_orient_method;
+
+typedef enum batten_orientation_used {
+  BATTEN_ORIENTATION_NONE = 0,
+  BATTEN_ORIENTATION_GIVEN,
+  BATTEN_ORIENTATION_ESTIMATED
+} batten_orientation_used;
+
+typedef enum batten_sign_state {
+  BATTEN_SIGN_CLEAN = 0, /* first fit passed the check */
+  BATTEN_SIGN_CURED,     /* the refit with orientation passed it */
+  BATTEN_SIGN_AMBIGUOUS  /* the check still finds something: status BATTEN_W_AMBIGUOUS */
+} batten_sign_state;
+
+typedef struct batten_solid_options {
+  size_t struct_size;
+  const batten_carrier *carrier; /* NULL = auto: batten_carrier_fit */
+  const double *normals;         /* [N][n] outward, any positive length; NULL = none */
+  double merge_radius;           /* points closer than this become one; caller's unit, >= 0. Default 0: only points
+                                    equal to within 1e-12 of the box merge */
+  batten_orientation orientation;
+  batten_orient_data orient_data;
+  batten_orient_method orient_method;
+  size_t energy_points;          /* least-energy orientation works on at most so many points. Default 1000. */
+  double pair_distance;          /* off-surface distance over the local spacing, in (0, 1]. Default 0.5. */
+  size_t check_cells;            /* cells of the sign check's grid along the longest side. Default 40. */
+  batten_spline_options spline;
+} batten_solid_options;
+BATTEN_API batten_solid_options batten_solid_options_default(void);
+
+/* What the check of the sign field found. */
+typedef struct batten_sign_check {
+  size_t weak_gradients;     /* data points where |grad f| is under 1 % of the median */
+  size_t flipped_neighbours; /* pairs of neighbouring points with locally like tangents whose gradients oppose */
+  size_t phantom_components; /* pieces of f = 0 without data near them */
+  size_t phantom_cells;      /* grid cells crossed by f = 0 farther than 3 local spacings from all data */
+  int inside_out;            /* non-zero: f was positive far away and has been turned */
+  int clean;                 /* all of the above are fine */
+} batten_sign_check;
+
+typedef struct batten_solid_info {
+  size_t points_given, points_used, duplicates_merged;
+  batten_sign_state sign;
+  batten_orientation_used orientation;
+  batten_orient_data orient_data;     /* what the refit used; AUTO when there was none */
+  batten_orient_method orient_method; /* what estimated the normals; AUTO when nothing did */
+  double orient_lambda;               /* smoothing at which the estimated orientation was settled */
+  batten_sign_check check;            /* of the first fit */
+  batten_sign_check check_final;      /* of the solid that is returned */
+  double residual_max;  /* max |f(x_i)| / (max - min of the interpolated values) */
+  double distance_max;  /* max |f(x_i)| / |grad f(x_i)|, caller's unit */
+  double spacing;       /* median distance to the nearest other point, caller's unit */
+  batten_spline_info spline; /* of the fit that is returned */
+  double time_fit_s, time_check_s, time_orient_s;
+} batten_solid_info;
+
+/* Fit to points [count][n], n = 2 or 3 (1: two points or more bound an interval).
+ * Positive status: BATTEN_W_AMBIGUOUS, BATTEN_W_ACCURACY. Fails as batten_spline_fit, and INVALID for a carrier
+ * that the spline reproduces (the text says which to take). *out untouched on failure; info may be NULL. */
+BATTEN_API batten_status batten_solid_fit(batten_context *ctx, unsigned n, size_t count, const double *points,
+                                          const batten_solid_options *opt, batten_solid **out,
+                                          batten_solid_info *info);
+
+/* The same spline under another carrier: the paper's deformation (figure 5). */
+BATTEN_API batten_status batten_solid_with_carrier(batten_context *ctx, const batten_solid *solid,
+                                                   batten_carrier *carrier, batten_solid **out);
+
+/* From parts; sign is +1 or -1. spline and carrier are retained. lower/upper [n]: box of the data. */
+BATTEN_API batten_status batten_solid_create(batten_context *ctx, batten_spline *spline, batten_carrier *carrier,
+                                             int sign, const double *lower, const double *upper,
+                                             batten_solid **out);
+
+/* f = sign (f_c - U), its gradient and Hessian; arrays as batten_spline_evaluate. */
+BATTEN_API batten_status batten_solid_evaluate(batten_context *ctx, const batten_solid *s, size_t count,
+                                               const double *points, double *values, double *gradients,
+                                               double *hessians);
+BATTEN_API batten_field batten_solid_field(const batten_solid *s);
+
+BATTEN_API unsigned batten_solid_dimension(const batten_solid *s);
+BATTEN_API batten_spline *batten_solid_spline(const batten_solid *s);   /* not retained */
+BATTEN_API batten_carrier *batten_solid_carrier(const batten_solid *s); /* not retained */
+BATTEN_API int batten_solid_sign(const batten_solid *s);
+BATTEN_API void batten_solid_box(const batten_solid *s, double *lower, double *upper); /* [n] of the data */
+
+/* The data points on the surface (not the off-surface pairs): [count][n], seeds for the polygoniser. */
+BATTEN_API const double *batten_solid_points(const batten_solid *s, size_t *count);
+
+BATTEN_API batten_solid *batten_solid_retain(batten_solid *s);
+BATTEN_API void batten_solid_free(batten_solid *s);
+
+/* Normals of unoriented surface points, [count][n] outward unit vectors. method_used, lambda_used may be NULL.
+ * n = 2 or 3. Fails: INVALID, NOMEM, TOO_LARGE, SINGULAR, CANCELLED. */
+BATTEN_API batten_status batten_orient(batten_context *ctx, unsigned n, size_t count, const double *points,
+                                       batten_orient_method method, size_t energy_points, double *normals,
+                                       batten_orient_method *method_used, double *lambda_used);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,109 @@
+/* Volume splines: interpolation of scattered values (and gradients) by the Green's function of the
+ * iterated Laplacian.   [Savchenko, Pasko, Okunev, Kunii 1995, section 3; Duchon 1977]
+ *
+ *   U(x) = sum_i w_i phi(|x - x_i|) - sum_i g_i . grad phi(x - x_i) + polynomial of degree m-1
+ *   phi(r) = s r^(2m-n)        n odd       2m > n, n in {1, 2, 3}
+ *   phi(r) = s r^(2m-n) ln r   n even      s = +-1 makes phi conditionally positive definite
+ *
+ * The second sum is there when gradients are prescribed (Hermite-Birkhoff data); it needs a kernel with
+ * two derivatives to spare, 2m - n > 2. Points are centred and scaled to a unit box inside, so
+ * coordinates far from the origin lose nothing but the digits that they do not have. */
+#ifndef BATTEN_SPLINE_H
+#define BATTEN_SPLINE_H
+
+#include <batten/field.h>
+#include <batten/saddle.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct batten_spline batten_spline;
+
+/* Data to interpolate. */
+typedef struct batten_spline_data {
+  size_t struct_size;
+  unsigned n;             /* dimension, 1 .. 3 */
+  size_t count;           /* N points */
+  const double *points;   /* [N][n], pairwise distinct */
+  const double *values;   /* [N] */
+  size_t gradient_count;  /* M <= N gradients, default 0 */
+  const size_t *gradient_at; /* [M] indices into points, increasing; NULL = the first M */
+  const double *gradients;   /* [M][n] */
+} batten_spline_data;
+BATTEN_API batten_spline_data batten_spline_data_default(void);
+
+typedef struct batten_spline_options {
+  size_t struct_size;
+  unsigned m;              /* order of the energy, 2m > n, <= 4. Default 2. */
+  double smoothing;        /* rho >= 0, added to the diagonal of phi(|x_i - x_j|) in the unit box: 0 interpolates,
+                              larger is smoother. Default 0. */
+  const double *smoothing_per_point; /* [N] >= 0 in place of smoothing; NULL = one for all */
+  size_t loo_samples;      /* leave-one-out errors of so many points, evenly drawn; SIZE_MAX = all, 0 = none.
+                              Default 256. */
+  batten_saddle_options saddle; /* method, refinement, tolerance */
+} batten_spline_options;
+BATTEN_API batten_spline_options batten_spline_options_default(void);
+
+typedef struct batten_spline_info {
+  batten_saddle_info saddle;
+  double residual_max;  /* max |U(x_i) - v_i| / (max v - min v), recomputed by the evaluator; with smoothing
+                           against v_i - rho w_i */
+  double gradient_residual_max; /* the same for gradients, relative to the largest |gradient|; 0 without */
+  double loo_rms;       /* root mean square of U_without_i(x_i) - v_i over the sample, unit of the values; NaN when
+                           not computed (loo_samples = 0 or smoothing per point) */
+  size_t loo_samples;   /* how many */
+  double energy;        /* w' K w: the minimised energy up to its constant, unit box */
+  double time_total_s;
+} batten_spline_info;
+
+/* Bytes at the peak of a fit, predicted; SIZE_MAX on overflow. */
+BATTEN_API size_t batten_spline_bytes(batten_saddle_method method, unsigned n, unsigned m, size_t points,
+                                      size_t gradients);
+
+/* Fits; *out is freed by batten_spline_free and untouched on failure; info may be NULL.
+ * Fails: INVALID (2m <= n, non-finite, equal points: names both), TOO_LARGE, NOMEM, SINGULAR (points on a line,
+ * plane or other zero set of the polynomial part: names it), CANCELLED. Time O((N + nM)^3 / 3). */
+BATTEN_API batten_status batten_spline_fit(batten_context *ctx, const batten_spline_data *data,
+                                           const batten_spline_options *opt, batten_spline **out,
+                                           batten_spline_info *info);
+
+/* Everything that defines a spline, for saving and loading: pointers into the spline. */
+typedef struct batten_spline_parts {
+  size_t struct_size;
+  unsigned n, m;
+  size_t count;              /* N centres */
+  const double *centers;     /* [N][n], caller's unit */
+  const double *coefficients; /* [N] w_i for the unit box */
+  size_t gradient_count;     /* M */
+  const size_t *gradient_at; /* [M] increasing */
+  const double *gradient_coefficients; /* [M][n] */
+  size_t polynomial_count;   /* k = C(n+m-1, n) */
+  const double *polynomial;  /* [k] for the unit box; monomials by degree: 1, x, y, z, x^2, xy, xz, y^2, yz, z^2, ... */
+  double origin[3];          /* unit box coordinate = (x - origin) / scale */
+  double scale;
+} batten_spline_parts;
+BATTEN_API void batten_spline_get_parts(const batten_spline *s, batten_spline_parts *parts);
+/* The inverse: copies. Evaluates to the same bits as the spline that the parts came from. */
+BATTEN_API batten_status batten_spline_create(batten_context *ctx, const batten_spline_parts *parts,
+                                              batten_spline **out);
+
+/* points [count][n]; values [count], gradients [count][n], hessians [count][n][n]; each may be NULL.
+ * Threaded and vectorised; the same bits for any thread count and any batch. Derivatives that do not exist
+ * at a centre (r^1: gradient; r^3 with gradient data: Hessian) are evaluated as if its term were 0. */
+BATTEN_API batten_status batten_spline_evaluate(batten_context *ctx, const batten_spline *s, size_t count,
+                                                const double *points, double *values, double *gradients,
+                                                double *hessians);
+
+/* The spline as a field; valid as long as the spline. */
+BATTEN_API batten_field batten_spline_field(const batten_spline *s);
+
+/* Shared ownership: retain adds an owner, free drops one (NULL is fine). The context that it was made with must
+ * outlive it. */
+BATTEN_API batten_spline *batten_spline_retain(batten_spline *s);
+BATTEN_API void batten_spline_free(batten_spline *s);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

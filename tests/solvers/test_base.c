@@ -1,0 +1,121 @@
+/* Context, memory, status, parallel loop. */
+#include "base/checked.h"
+#include "tap.h"
+
+static void test_status(void) {
+  T_CHECK(!strcmp(batten_status_name(BATTEN_E_NOMEM), "BATTEN_E_NOMEM"), "status name");
+  T_CHECK(!strcmp(batten_status_text(BATTEN_OK), "done"), "status text");
+  T_CHECK(!strcmp(batten_status_name((batten_status)77), "unknown status"), "name of a status that is none");
+  T_CHECK(!strcmp(batten_version(), "0.1.0"), "version %s", batten_version());
+}
+
+static void test_options(void) {
+  batten_context *ctx = NULL;
+  batten_context_options zero = {0}, o = batten_context_options_default();
+  T_CHECK(batten_context_new(&zero, &ctx) == BATTEN_E_INVALID && !ctx, "zeroed options are refused");
+  o.threads = 0;
+  T_CHECK(batten_context_new(&o, &ctx) == BATTEN_E_INVALID && !ctx, "no threads are refused");
+  o = batten_context_options_default();
+  o.allocate = t_allocate;
+  T_CHECK(batten_context_new(&o, &ctx) == BATTEN_E_INVALID && !ctx, "half a pair of memory hooks is refused");
+  T_CHECK(batten_context_new(NULL, NULL) == BATTEN_E_INVALID, "no result pointer is refused");
+}
+
+static void test_memory(void) {
+  t_memory memory = {0};
+  batten_context *ctx = t_context(&memory, NULL, 1);
+  double *a = batten_alloc_array(ctx, 10, sizeof *a);
+  T_CHECK((uintptr_t)a % 64 == 0 && batten_bytes_in_use(ctx) == 80, "80 bytes, aligned");
+  for (int i = 0; i < 10; i++) a[i] = i;
+  a = batten_realloc_array(ctx, a, 1000, sizeof *a);
+  T_CHECK(a && a[9] == 9 && batten_bytes_in_use(ctx) == 8000, "grown, content kept");
+  T_CHECK(batten_bytes_peak(ctx) == 8080, "peak counts both blocks");
+  T_CHECK(!batten_alloc_array(ctx, SIZE_MAX / 4, 8) && strstr(batten_error(ctx), "out of memory"), "product overflow");
+  T_CHECK(!batten_alloc(ctx, SIZE_MAX - 4), "sum overflow");
+  memory.fail_at = memory.calls + 1;
+  T_CHECK(!batten_realloc_array(ctx, a, 2000, sizeof *a) && a[9] == 9, "failed growth leaves the block");
+  batten_free(ctx, a);
+  batten_free(ctx, NULL);
+  batten_free(ctx, batten_alloc(ctx, 0));
+  T_CHECK(batten_bytes_in_use(ctx) == 0 && memory.live == 1, "all released");
+  batten_context_free(ctx);
+  T_CHECK(memory.live == 0, "context released");
+
+  batten_context_options o = batten_context_options_default();
+  o.memory_limit = 1000;
+  ctx = NULL;
+  batten_context_new(&o, &ctx);
+  void *b = batten_alloc(ctx, 900);
+  T_CHECK(b && !batten_alloc(ctx, 200) && strstr(batten_error(ctx), "limit is 1000"), "limit: %s", batten_error(ctx));
+  batten_free(ctx, b);
+  batten_context_free(ctx);
+}
+
+static void test_checked(void) {
+  size_t out;
+  T_CHECK(batten_mul(3, 5, &out) && out == 15, "product");
+  T_CHECK(!batten_mul(SIZE_MAX / 2, 3, &out) && out == SIZE_MAX, "product saturates");
+  T_CHECK(!batten_mul3(SIZE_MAX / 2, 3, 1, &out) && out == SIZE_MAX, "triple product saturates");
+  T_CHECK(batten_mul3(0, SIZE_MAX, 9, &out) && out == 0, "zero");
+  T_CHECK(!batten_add(SIZE_MAX, 1, &out) && out == SIZE_MAX, "sum saturates");
+  double v[3] = {1, NAN, INFINITY};
+  T_CHECK(batten_first_nonfinite(3, v) == 1 && batten_first_nonfinite(1, v) == 1, "first non-finite value");
+}
+
+static void square(void *arg, size_t i) {
+  double *v = arg;
+  for (int k = 0; k < 100; k++) v[i] = v[i] * 0.5 + (double)(i * i);
+}
+
+static void executor(void *user, size_t tasks, void (*task)(void *, size_t), void *arg) {
+  (*(int *)user)++;
+  for (size_t i = tasks; i-- > 0;) task(arg, i);
+}
+
+static void test_parallel(void) {
+  enum { N = 1000 };
+  static double one[N], v[N];
+  batten_context *ctx = t_context(NULL, NULL, 1);
+  batten_parallel(ctx, N, square, one);
+  batten_parallel(ctx, 0, square, NULL);
+  batten_context_free(ctx);
+  for (unsigned threads = 2; threads <= 128; threads *= 4) {
+    memset(v, 0, sizeof v);
+    ctx = t_context(NULL, NULL, threads);
+    batten_parallel(ctx, N, square, v);
+    batten_context_free(ctx);
+    T_CHECK(!memcmp(one, v, sizeof v), "same bits on %u threads", threads);
+  }
+  int calls = 0;
+  batten_context_options o = batten_context_options_default();
+  o.parallel_for = executor;
+  o.parallel_user = &calls;
+  ctx = NULL;
+  batten_context_new(&o, &ctx);
+  memset(v, 0, sizeof v);
+  batten_parallel(ctx, N, square, v);
+  batten_context_free(ctx);
+  T_CHECK(calls == 1 && !memcmp(one, v, sizeof v), "same bits on the host's executor");
+}
+
+static void test_progress(void) {
+  t_progress progress = {.cancel_at = 2};
+  batten_context *ctx = t_context(NULL, &progress, 1);
+  T_OK(batten_progress(ctx, "work", 0), ctx);
+  T_STATUS(batten_progress(ctx, "work", 0.5), BATTEN_E_CANCELLED, ctx, "during work");
+  batten_fail(ctx, BATTEN_E_INVALID, "outer: %s", batten_error(ctx));
+  T_CHECK(!strcmp(batten_error(ctx), "outer: cancelled by the host during work"), "an error text may quote the last");
+  batten_context_free(ctx);
+}
+
+int main(void) {
+  test_status();
+  test_options();
+  test_memory();
+  test_checked();
+  test_parallel();
+  test_progress();
+  double a = batten_now();
+  T_CHECK(batten_now() >= a, "clock does not run backwards");
+  return t_done();
+}
