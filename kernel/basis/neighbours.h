@@ -1,0 +1,31 @@
+/* Nearest points: a balanced kd-tree over points [count][n], n = 1 .. 3.
+ *
+ * Answers are the same for any thread count and any order of the work: ties in distance go to the lower index.
+ * Time: O(N log N) to build, O(k log N) a query for points that lie on curves and surfaces. */
+#ifndef BATTEN_BASIS_NEIGHBOURS_H
+#define BATTEN_BASIS_NEIGHBOURS_H
+
+#include <batten/base.h>
+
+typedef struct batten_tree batten_tree;
+
+/* Copies the points. Fails: INVALID (n, non-finite point), TOO_LARGE, NOMEM. Queries only read the tree and need no
+ * context: they may run in worker tasks. */
+batten_status batten_tree_new(batten_context *ctx, unsigned n, size_t count, const double *points, batten_tree **out);
+void batten_tree_free(batten_context *ctx, batten_tree *tree);
+
+/* The k nearest points to x, nearest first: index [k], distance [k]. skip: an index that does not count (SIZE_MAX =
+ * none). Returns how many there are, min(k, points without skip). k is meant to be small (insertion into a list). */
+size_t batten_tree_nearest(const batten_tree *tree, const double *x, size_t k, size_t skip, size_t *index,
+                           double *distance);
+
+/* All points with |p - x| <= radius, in no particular but fixed order: index [count of the tree]. Returns how many.
+ */
+size_t batten_tree_within(const batten_tree *tree, const double *x, double radius, size_t *index);
+
+/* The k nearest other points of every point: index [count][k], distance [count][k] (NULL = not wanted), nearest
+ * first. Fails: INVALID (k >= count unless count = 0), TOO_LARGE, NOMEM. */
+batten_status batten_neighbours(batten_context *ctx, unsigned n, size_t count, const double *points, size_t k,
+                                size_t *index, double *distance);
+
+#endif
