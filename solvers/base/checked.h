@@ -19,7 +19,8 @@ static inline bool batten_add(size_t a, size_t b, size_t *out) {
   return fits;
 }
 static inline bool batten_mul3(size_t a, size_t b, size_t c, size_t *out) {
-  return batten_mul(a, b, out) & batten_mul(*out, c, out);
+  bool first = batten_mul(a, b, out);
+  return batten_mul(*out, c, out) && first;
 }
 
 /* Index of the first value that is not finite, or count. */
