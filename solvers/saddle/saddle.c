@@ -1,0 +1,307 @@
+/* The public calls of <batten/saddle.h>: arguments, choice of method, memory, iterative refinement, fall-back.
+ *
+ * Refinement recomputes the residual from fresh entries of K in double. A float factor then gives a double solution
+ * as long as its error times the condition stays below 1; where it does not contract, the next method takes over:
+ * mixed -> Cholesky -> LDL'. */
+#include <float.h>
+#include <string.h>
+
+#include "system.h"
+
+/* A step that gains less than this factor has stalled. */
+static const double STALL = 0.25;
+
+const char *batten_saddle_method_name(batten_saddle_method method) {
+  switch (method) {
+    case BATTEN_SADDLE_AUTO: return "auto";
+    case BATTEN_SADDLE_CHOLESKY: return "cholesky";
+    case BATTEN_SADDLE_CHOLESKY_MIXED: return "cholesky-mixed";
+    case BATTEN_SADDLE_LDL: return "ldl";
+    case BATTEN_SADDLE_QR: return "qr";
+  }
+  return "unknown method";
+}
+
+batten_saddle_options batten_saddle_options_default(void) {
+  return (batten_saddle_options){.struct_size = sizeof(batten_saddle_options), .refine_max = 10, .residual_tol = 1e-13};
+}
+
+/* ---- Memory and choice of method ---- */
+
+static size_t handle_bytes(size_t k) { return sizeof(batten_saddle) + k * sizeof(double); }
+
+size_t batten_saddle_bytes(batten_saddle_method method, size_t n, size_t k) {
+  size_t order, bytes;
+  if (!batten_add(n, k, &order) || order > SIZE_MAX / 64) return SIZE_MAX;
+  bytes = batten_saddle_dense_bytes(method, n, k);
+  return batten_add(bytes, handle_bytes(k), &bytes) ? bytes : SIZE_MAX;
+}
+
+static batten_saddle_method first_method(const batten_saddle *s) {
+  return s->options.method == BATTEN_SADDLE_QR ? BATTEN_SADDLE_QR : BATTEN_SADDLE_LDL;
+}
+
+/* The method to try after `method`; AUTO when there is none. */
+static batten_saddle_method next_method(batten_saddle_method method) {
+  switch (method) {
+    case BATTEN_SADDLE_CHOLESKY_MIXED: return BATTEN_SADDLE_CHOLESKY;
+    case BATTEN_SADDLE_CHOLESKY: return BATTEN_SADDLE_LDL;
+    default: return BATTEN_SADDLE_AUTO;
+  }
+}
+
+/* ---- Factor ---- */
+
+static batten_status factor_with(batten_saddle *s, batten_saddle_method method) {
+  s->info.method = method;
+  return batten_saddle_dense_factor(s, method);
+}
+
+/* Factors by method, or by the first after it that works. */
+static batten_status factor_from(batten_saddle *s, batten_saddle_method method) {
+  s->factored = false;
+  for (;;) {
+    batten_status st = factor_with(s, method);
+    batten_saddle_method next = next_method(method);
+    if (st == BATTEN_OK) s->factored = true;
+    if (st != BATTEN_E_SINGULAR || next == BATTEN_SADDLE_AUTO) return st;
+    s->info.fallbacks++;
+    method = next;
+  }
+}
+
+/* ---- Arguments ---- */
+
+static batten_status check_matrix(batten_context *ctx, const batten_saddle_matrix *m) {
+  size_t order;
+  if (!batten_add(m->n, m->k, &order) || !batten_la_fits(order))
+    return batten_fail(ctx, BATTEN_E_TOO_LARGE, "matrix.n: %zu + %zu rows exceed LAPACK's integers", m->n, m->k);
+  if (m->k >= m->n && m->k > 0)
+    return batten_fail(ctx, BATTEN_E_INVALID, "matrix.k: %zu columns of P need more than %zu rows; add points or lower "
+                       "the polynomial degree", m->k, m->n);
+  if (m->k > 0 && !m->p) return batten_fail(ctx, BATTEN_E_INVALID, "matrix.p: NULL with k = %zu", m->k);
+  if (m->n > 0 && !m->fill) return batten_fail(ctx, BATTEN_E_INVALID, "matrix.fill: NULL; give a callback");
+  size_t bad = batten_first_nonfinite(m->n * m->k, m->p);
+  if (bad < m->n * m->k)
+    return batten_fail(ctx, BATTEN_E_INVALID, "matrix.p[%zu][%zu]: %g is not finite", bad / m->n, bad % m->n, m->p[bad]);
+  return BATTEN_OK;
+}
+
+static batten_status check_options(batten_context *ctx, const batten_saddle_options *o) {
+  batten_status st = batten_check_struct(ctx, "batten_saddle_options", o->struct_size, sizeof *o);
+  if (st < 0) return st;
+  if ((int)o->method < BATTEN_SADDLE_AUTO || (int)o->method > BATTEN_SADDLE_QR)
+    return batten_fail(ctx, BATTEN_E_INVALID, "opt.method: %d; use one of batten_saddle_method", (int)o->method);
+  if (!(o->residual_tol > 0 && o->residual_tol <= DBL_MAX))
+    return batten_fail(ctx, BATTEN_E_INVALID, "opt.residual_tol: %g; must be positive", o->residual_tol);
+  return BATTEN_OK;
+}
+
+static void scale_p(batten_saddle *s) {
+  size_t n = s->matrix.n;
+  for (size_t c = 0; c < s->matrix.k; c++) {
+    double largest = 0;
+    for (size_t i = 0; i < n; i++) largest = fmax(largest, fabs(s->matrix.p[i + c * n]));
+    s->p_scale[c] = largest > 0 ? ldexp(1, -ilogb(largest)) : 1;
+  }
+}
+
+batten_status batten_saddle_factor(batten_context *ctx, const batten_saddle_matrix *matrix,
+                                   const batten_saddle_options *opt, batten_saddle **out) {
+  if (!ctx) return BATTEN_E_INVALID;
+  if (!matrix || !out) return batten_fail(ctx, BATTEN_E_INVALID, "%s: NULL", matrix ? "out" : "matrix");
+  batten_saddle_options options = opt ? *opt : batten_saddle_options_default();
+  batten_status st = check_options(ctx, &options);
+  if (st < 0) return st;
+  st = check_matrix(ctx, matrix);
+  if (st < 0) return st;
+
+  batten_saddle *s = batten_alloc(ctx, sizeof *s);
+  if (!s) return BATTEN_E_NOMEM;
+  *s = (batten_saddle){.ctx = ctx, .matrix = *matrix, .options = options};
+  st = BATTEN_E_NOMEM;
+  s->p_scale = batten_alloc_array(ctx, matrix->k, sizeof *s->p_scale);
+  if (!s->p_scale) goto done;
+  scale_p(s);
+  st = batten_saddle_probe_scale(s);
+  if (st < 0) goto done;
+  st = batten_saddle_qr_new(s);
+  if (st < 0) goto done;
+  st = factor_from(s, first_method(s));
+done:
+  if (st < 0) batten_saddle_free(s);
+  else *out = s;
+  return st;
+}
+
+void batten_saddle_free(batten_saddle *s) {
+  if (!s) return;
+  batten_saddle_dense_free(s);
+  batten_saddle_qr_free(s);
+  batten_free(s->ctx, s->p_scale);
+  batten_free(s->ctx, s);
+}
+
+batten_saddle_info batten_saddle_get_info(const batten_saddle *s) { return s->info; }
+
+/* ---- Solve ---- */
+
+/* b [N+k] holds a right side of the caller's system and becomes its solution, once, unrefined. */
+static batten_status apply_factor(batten_saddle *s, double *b) {
+  size_t n = s->matrix.n, k = s->matrix.k;
+  for (size_t i = 0; i < n; i++) b[i] *= s->scale;
+  for (size_t c = 0; c < k; c++) b[n + c] *= s->p_scale[c];
+  batten_status st = batten_saddle_dense_solve(s, 1, b);
+  for (size_t c = 0; c < k; c++) b[n + c] *= s->p_scale[c] / s->scale;
+  return st;
+}
+
+static double norm_max(size_t n, const double *x) {
+  double largest = 0;
+  for (size_t i = 0; i < n; i++) {
+    if (!(fabs(x[i]) <= DBL_MAX)) return INFINITY; /* an overflow in the factor counts as a miss, not as nothing */
+    largest = fmax(largest, fabs(x[i]));
+  }
+  return largest;
+}
+
+/* r [N+k] = right side - matrix * x, x [N+k]. */
+static batten_status residual(const batten_saddle *s, const double *f, const double *x, double *r) {
+  size_t n = s->matrix.n, k = s->matrix.k;
+  const double *p = s->matrix.p;
+  batten_status st = batten_saddle_product(s, false, x, r);
+  if (st < 0) return st;
+  for (size_t c = 0; c < k; c++) {
+    double sum = 0;
+    for (size_t i = 0; i < n; i++) {
+      r[i] += p[i + c * n] * x[n + c];
+      sum += p[i + c * n] * x[i];
+    }
+    r[n + c] = -sum;
+  }
+  for (size_t i = 0; i < n; i++) r[i] = f[i] - r[i];
+  return BATTEN_OK;
+}
+
+/* The residual that rounding alone leaves: eps * max(|K||w| + |P||c| + |f|) / max |f|, times a few. scratch [N]. */
+static batten_status attainable(const batten_saddle *s, const double *f, const double *x, double f_norm,
+                                double *scratch, double *out) {
+  size_t n = s->matrix.n, k = s->matrix.k;
+  batten_status st = batten_saddle_product(s, true, x, scratch);
+  if (st < 0) return st;
+  for (size_t c = 0; c < k; c++)
+    for (size_t i = 0; i < n; i++) scratch[i] += fabs(s->matrix.p[i + c * n] * x[n + c]);
+  for (size_t i = 0; i < n; i++) scratch[i] += fabs(f[i]);
+  *out = 8 * DBL_EPSILON * norm_max(n, scratch) / f_norm;
+  return BATTEN_OK;
+}
+
+/* Solves and refines with the factor at hand. x, r, best [N+k]; the best solution ends in best, its residual in
+ * info. *stalled: refinement stopped above the tolerance. */
+static batten_status refine(batten_saddle *s, const double *f, double f_norm, double *x, double *r, double *best,
+                            bool *stalled) {
+  size_t n = s->matrix.n, order = batten_saddle_order(s);
+  double last = INFINITY;
+  memcpy(r, f, n * sizeof *r);
+  memset(r + n, 0, s->matrix.k * sizeof *r);
+  memset(x, 0, order * sizeof *x);
+  memset(best, 0, order * sizeof *best);
+  *stalled = false;
+  s->info.residual = 1; /* of zero */
+  for (unsigned step = 0;; step++) {
+    batten_status st = apply_factor(s, r);
+    if (st < 0) return st;
+    for (size_t i = 0; i < order; i++) x[i] += r[i];
+    st = residual(s, f, x, r);
+    if (st < 0) return st;
+    double now = norm_max(n, r) / f_norm;
+    if (now < s->info.residual) {
+      s->info.residual = now;
+      s->info.refinements = step;
+      memcpy(best, x, order * sizeof *best);
+    }
+    if (now <= s->options.residual_tol) return BATTEN_OK;
+    *stalled = !(now <= STALL * last) && step > 0;
+    if (*stalled || step >= s->options.refine_max) return BATTEN_OK;
+    last = now;
+  }
+}
+
+batten_status batten_saddle_solve(batten_context *ctx, batten_saddle *s, const double *f, double *w, double *c) {
+  if (!ctx) return BATTEN_E_INVALID;
+  if (!s) return batten_fail(ctx, BATTEN_E_INVALID, "s: NULL; make it with batten_saddle_factor()");
+  size_t n = s->matrix.n, k = s->matrix.k, order = n + k;
+  if ((n > 0 && (!f || !w)) || (k > 0 && !c))
+    return batten_fail(ctx, BATTEN_E_INVALID, "%s: NULL", n > 0 && !f ? "f" : n > 0 && !w ? "w" : "c");
+  size_t bad = batten_first_nonfinite(n, f);
+  if (bad < n) return batten_fail(ctx, BATTEN_E_INVALID, "f[%zu]: %g is not finite", bad, f[bad]);
+
+  double start = batten_now(), f_norm = norm_max(n, f);
+  batten_status st = BATTEN_OK;
+  double *x = batten_alloc_array(ctx, order, 3 * sizeof *x);
+  if (!x) return BATTEN_E_NOMEM;
+  double *r = x + order, *best = r + order;
+  bool stalled = false;
+  s->info.residual = 0;
+  s->info.refinements = 0;
+  memset(best, 0, order * sizeof *best);
+  if (!s->factored) st = factor_from(s, s->info.method);
+  while (st == BATTEN_OK && f_norm > 0) {
+    st = refine(s, f, f_norm, x, r, best, &stalled);
+    if (st < 0 || !stalled || next_method(s->info.method) == BATTEN_SADDLE_AUTO) break;
+    /* A better factor helps only where rounding of the solution itself is not the limit. */
+    double limit;
+    st = attainable(s, f, best, f_norm, r, &limit);
+    if (st < 0 || s->info.residual <= limit) break;
+    s->info.fallbacks++;
+    st = factor_from(s, next_method(s->info.method));
+  }
+  if (st < 0) goto done;
+  memcpy(w, best, n * sizeof *w);
+  if (k > 0) memcpy(c, best + n, k * sizeof *c);
+  s->info.time_solve_s = batten_now() - start;
+  if (s->info.residual > s->options.residual_tol)
+    st = batten_fail(ctx, BATTEN_W_ACCURACY, "residual: %.3g after %u refinements, above the tolerance %.3g; rcond %.3g",
+                     s->info.residual, s->info.refinements, s->options.residual_tol, s->info.rcond);
+done:
+  batten_free(ctx, x);
+  return st;
+}
+
+/* ---- Diagonal of the inverse ---- */
+
+enum { RIGHT_SIDES = 64 }; /* solved at a time: enough for level-3 BLAS */
+
+batten_status batten_saddle_inverse_diagonal(batten_context *ctx, batten_saddle *s, size_t count, const size_t *index,
+                                             double *diagonal) {
+  if (!ctx) return BATTEN_E_INVALID;
+  if (!s) return batten_fail(ctx, BATTEN_E_INVALID, "s: NULL; make it with batten_saddle_factor()");
+  if (count > 0 && (!index || !diagonal))
+    return batten_fail(ctx, BATTEN_E_INVALID, "%s: NULL", index ? "diagonal" : "index");
+  size_t n = s->matrix.n, order = batten_saddle_order(s);
+  for (size_t q = 0; q < count; q++)
+    if (index[q] >= n) return batten_fail(ctx, BATTEN_E_INVALID, "index[%zu]: %zu; must be below %zu", q, index[q], n);
+  if (count == 0) return BATTEN_OK;
+
+  batten_status st = BATTEN_E_NOMEM;
+  size_t columns = count < RIGHT_SIDES ? count : RIGHT_SIDES;
+  double *result = NULL, *b = batten_alloc_array(ctx, order * columns, sizeof *b);
+  if (!b) goto done;
+  result = batten_alloc_array(ctx, count, sizeof *result);
+  if (!result) goto done;
+  st = s->factored ? BATTEN_OK : factor_from(s, s->info.method);
+  for (size_t first = 0; first < count && st == BATTEN_OK; first += columns) {
+    size_t these = count - first < columns ? count - first : columns;
+    st = batten_progress(ctx, "leave-one-out", (double)first / (double)count);
+    if (st < 0) break;
+    memset(b, 0, order * these * sizeof *b);
+    for (size_t q = 0; q < these; q++) b[index[first + q] + q * order] = 1;
+    st = batten_saddle_dense_solve(s, these, b);
+    for (size_t q = 0; q < these; q++) result[first + q] = s->scale * b[index[first + q] + q * order];
+  }
+  if (st == BATTEN_OK) memcpy(diagonal, result, count * sizeof *diagonal);
+done:
+  batten_free(ctx, result);
+  batten_free(ctx, b);
+  return st;
+}
