@@ -1,0 +1,48 @@
+/* Inside of batten_orient: the parts that orient.c puts together.
+ *
+ * All points here are in the unit size: centroid 0, twice the root mean square distance from it 1 (a sphere of
+ * diameter 1). It turns with the data, unlike a box, so that rotated data give the same normals. */
+#ifndef BATTEN_SOLID_ORIENT_H
+#define BATTEN_SOLID_ORIENT_H
+
+#include <batten/solid.h>
+#include <stdbool.h>
+
+/* What the neighbourhoods say, without any sign. */
+typedef struct batten_orient_graph {
+  unsigned n;
+  size_t count, k;      /* k nearest other points of each point */
+  const double *points; /* [count][n], not owned */
+  size_t *index;        /* [count][k], nearest first */
+  double *distance;     /* [count][k] */
+  double *plane;        /* [count][n] unit normal of the plane (line) through the neighbours, sign arbitrary */
+  double *flatness;     /* [count] 1 on a plane, 0 where no direction is thinner than the next */
+} batten_orient_graph;
+
+/* count >= 2. On failure nothing is held. */
+batten_status batten_orient_graph_new(batten_context *ctx, unsigned n, size_t count, const double *points,
+                                      batten_orient_graph *graph);
+void batten_orient_graph_free(batten_context *ctx, batten_orient_graph *graph);
+
+/* How well normals u at a and v at b fit to one smooth surface, in [-1, 1]: v reflected in the bisector plane of a
+ * and b, times u. It is 1 where a circle through both points has the normals u and v, whatever the angle that it
+ * turns through; also where a and b face each other across a thin wall or a narrow gap and the normals oppose. -1:
+ * the same with one of them turned round. About 0: nothing can be said. */
+double batten_orient_agreement(unsigned n, const double *a, const double *b, const double *u, const double *v);
+
+/* Share of the neighbour pairs on one locally flat piece whose normals have opposing signs, in [0, 1]. */
+double batten_orient_conflicts(const batten_orient_graph *graph, const double *normals);
+
+/* Labels piece[i] < return value: points joined by neighbour pairs whose normals agree by more than `threshold`. With
+ * threshold -2 the connected components of the neighbour graph. Numbered by their lowest point. */
+size_t batten_orient_pieces(const batten_orient_graph *graph, const double *normals, double threshold, size_t *piece);
+
+/* Sum over fixed directions of (normal at the extreme point) . direction: positive when normals look outwards. Of the
+ * points members[0 .. count), or of all count points where members is NULL. */
+double batten_orient_outwardness(unsigned n, const double *points, const double *normals, size_t count,
+                                 const size_t *members);
+
+/* normals [count][n] from the planes alone: see orient_planes.c. */
+batten_status batten_orient_planes(batten_context *ctx, const batten_orient_graph *graph, double *normals);
+
+#endif

@@ -1,0 +1,158 @@
+/* Neighbours, local planes, and what normals of neighbours say about each other.
+ *
+ * The plane through a point is the one of least squares through its k nearest points and itself. Two normals are
+ * compared after reflection in the bisector plane of their points (after Koenig and Gumhold 2009, "Consistent
+ * propagation of normal orientations"): a plain scalar product calls the two sides of a rim alike or unalike by
+ * chance. */
+#include "orient.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/checked.h"
+#include "basis/eigen3.h"
+#include "basis/neighbours.h"
+
+/* Neighbours: enough to span a plane where points crowd along scan lines, few enough to stay local. */
+enum { NEIGHBOURS_2D = 4, NEIGHBOURS_3D = 10, CHUNK = 256 };
+
+static double dot(unsigned n, const double *a, const double *b) {
+  double s = 0;
+  for (unsigned c = 0; c < n; c++) s += a[c] * b[c];
+  return s;
+}
+
+static void fit_plane(batten_orient_graph *g, size_t i) {
+  unsigned n = g->n;
+  double mean[3] = {0}, second[9] = {0}, values[3], vectors[9];
+  const double *x = g->points;
+  for (size_t q = 0; q <= g->k; q++) {
+    size_t j = q < g->k ? g->index[i * g->k + q] : i;
+    for (unsigned c = 0; c < n; c++) mean[c] += x[j * n + c] / (double)(g->k + 1);
+  }
+  for (size_t q = 0; q <= g->k; q++) {
+    size_t j = q < g->k ? g->index[i * g->k + q] : i;
+    for (unsigned r = 0; r < n; r++)
+      for (unsigned c = 0; c < n; c++) second[r * n + c] += (x[j * n + r] - mean[r]) * (x[j * n + c] - mean[c]);
+  }
+  batten_eigen_symmetric(n, second, values, vectors);
+  memcpy(g->plane + i * n, vectors, n * sizeof *vectors);
+  g->flatness[i] = values[1] > 0 ? 1 - sqrt(fmax(values[0], 0) / values[1]) : 0;
+}
+
+static void fit_planes(void *graph, size_t chunk) {
+  batten_orient_graph *g = graph;
+  size_t end = (chunk + 1) * CHUNK < g->count ? (chunk + 1) * CHUNK : g->count;
+  for (size_t i = chunk * CHUNK; i < end; i++) fit_plane(g, i);
+}
+
+void batten_orient_graph_free(batten_context *ctx, batten_orient_graph *g) {
+  batten_free(ctx, g->index);
+  batten_free(ctx, g->distance);
+  batten_free(ctx, g->plane);
+  batten_free(ctx, g->flatness);
+  *g = (batten_orient_graph){0};
+}
+
+batten_status batten_orient_graph_new(batten_context *ctx, unsigned n, size_t count, const double *points,
+                                      batten_orient_graph *graph) {
+  size_t k = n == 3 ? NEIGHBOURS_3D : NEIGHBOURS_2D, pairs;
+  if (k > count - 1) k = count - 1;
+  if (!batten_mul(count, k, &pairs)) return batten_fail(ctx, BATTEN_E_TOO_LARGE, "count: %zu points", count);
+  batten_orient_graph g = {.n = n, .count = count, .k = k, .points = points};
+  batten_status status = BATTEN_E_NOMEM;
+  if (!(g.index = batten_alloc_array(ctx, pairs, sizeof *g.index)) ||
+      !(g.distance = batten_alloc_array(ctx, pairs, sizeof *g.distance)) ||
+      !(g.plane = batten_alloc_array(ctx, count, n * sizeof *g.plane)) ||
+      !(g.flatness = batten_alloc_array(ctx, count, sizeof *g.flatness)))
+    goto done;
+  if ((status = batten_neighbours(ctx, n, count, points, k, g.index, g.distance)) < 0) goto done;
+  batten_parallel(ctx, (count + CHUNK - 1) / CHUNK, fit_planes, &g);
+done:
+  if (status < 0) batten_orient_graph_free(ctx, &g);
+  *graph = g;
+  return status;
+}
+
+double batten_orient_agreement(unsigned n, const double *a, const double *b, const double *u, const double *v) {
+  double e[3] = {0}, square = 0;
+  for (unsigned c = 0; c < n; c++) {
+    e[c] = b[c] - a[c];
+    square += e[c] * e[c];
+  }
+  double agreement = dot(n, u, v);
+  return square > 0 ? agreement - 2 * dot(n, e, u) * dot(n, e, v) / square : agreement;
+}
+
+double batten_orient_conflicts(const batten_orient_graph *g, const double *normals) {
+  unsigned n = g->n;
+  size_t alike = 0, opposed = 0;
+  for (size_t i = 0; i < g->count; i++)
+    for (size_t q = 0; q < g->k; q++) {
+      size_t j = g->index[i * g->k + q];
+      const double *p = g->plane + i * n, *r = g->plane + j * n, *x = g->points;
+      double agreement = batten_orient_agreement(n, x + i * n, x + j * n, p, r);
+      /* one flat piece: both planes thin, alike (0.8: 37 degrees), and equal with and without the reflection */
+      if (fmin(g->flatness[i], g->flatness[j]) < 0.5 || fabs(agreement) < 0.8 ||
+          agreement * dot(n, p, r) < 0.8 * fabs(agreement))
+        continue;
+      alike++;
+      if (agreement * dot(n, p, normals + i * n) * dot(n, r, normals + j * n) < 0) opposed++;
+    }
+  return alike ? (double)opposed / (double)alike : 0;
+}
+
+size_t batten_orient_pieces(const batten_orient_graph *g, const double *normals, double threshold, size_t *piece) {
+  unsigned n = g->n;
+  /* Union by lower root with path halving: a root is the lowest point of its piece. */
+  for (size_t i = 0; i < g->count; i++) piece[i] = i;
+  for (size_t i = 0; i < g->count; i++)
+    for (size_t q = 0; q < g->k; q++) {
+      size_t j = g->index[i * g->k + q], a = i, b = j;
+      if (threshold > -1 && batten_orient_agreement(n, g->points + i * n, g->points + j * n, normals + i * n,
+                                                    normals + j * n) <= threshold)
+        continue;
+      while (piece[a] != a) a = piece[a] = piece[piece[a]];
+      while (piece[b] != b) b = piece[b] = piece[piece[b]];
+      if (a < b)
+        piece[b] = a;
+      else
+        piece[a] = b;
+    }
+  size_t pieces = 0;
+  for (size_t i = 0; i < g->count; i++) /* parents come before children: their entry is a label already */
+    piece[i] = piece[i] == i ? pieces++ : piece[piece[i]];
+  return pieces;
+}
+
+/* Direction d of `count` spread evenly over the circle or (Fibonacci's spiral) the sphere. */
+static void direction(unsigned n, size_t d, size_t count, double u[3]) {
+  const double turn = 6.283185307179586, golden = 0.6180339887498949;
+  if (n == 2) {
+    u[0] = cos(turn * (double)d / (double)count);
+    u[1] = sin(turn * (double)d / (double)count);
+    return;
+  }
+  u[2] = 1 - (2 * (double)d + 1) / (double)count;
+  double r = sqrt(1 - u[2] * u[2]), angle = turn * golden * (double)d;
+  u[0] = r * cos(angle);
+  u[1] = r * sin(angle);
+}
+
+double batten_orient_outwardness(unsigned n, const double *points, const double *normals, size_t count,
+                                 const size_t *members) {
+  const size_t directions = n == 2 ? 32 : 64;
+  double sum = 0;
+  for (size_t d = 0; d < directions; d++) {
+    double u[3], best = -INFINITY;
+    size_t at = 0;
+    direction(n, d, directions, u);
+    for (size_t q = 0; q < count; q++) {
+      size_t i = members ? members[q] : q;
+      double height = dot(n, u, points + i * n);
+      if (height > best) best = height, at = i;
+    }
+    if (count) sum += dot(n, u, normals + at * n);
+  }
+  return sum;
+}
