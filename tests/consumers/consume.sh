@@ -21,7 +21,7 @@ install_batten() { # with shared or static libraries only; moved from where it w
   esac
 }
 
-loads_shared() { ldd "$1" | grep -q 'libbatten\.so\.0 => /'; }
+loads_shared() { ldd "$1" | grep -qF "libbatten.so.0 => $libdir/"; }
 
 try() { # try shared|static NAME: runs a program that was built, and looks what it loads
   if [ "$1" = shared ]; then
