@@ -60,7 +60,8 @@ def main():
     parser.add_argument("--library", action="append", default=[])
     parser.add_argument("paths", nargs="*")
     options = parser.parse_args()
-    compile_command = shlex.split(options.cc) + ["-std=c11", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-Wno-unused"]
+    compile_command = shlex.split(options.cc) + ["-std=c11", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-Wno-unused",
+                                                 "-Wno-unused-parameter"]
     compile_command += [f"-I{folder}" for folder in options.include]
     libraries = [os.path.abspath(library) for library in options.library]
     libraries += [f"-Wl,-rpath,{os.path.dirname(library)}" for library in libraries] + ["-lm"]
