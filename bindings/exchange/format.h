@@ -1,0 +1,32 @@
+/* Which format a path means. */
+#ifndef BATTEN_EXCHANGE_FORMAT_H
+#define BATTEN_EXCHANGE_FORMAT_H
+
+#include "stream.h"
+
+#include <batten/exchange.h>
+
+typedef enum bx_format {
+  BX_UNKNOWN = 0,
+  BX_TEXT, /* .xyz .txt .csv .tsv .asc .dat */
+  BX_PLY,
+  BX_OBJ,
+  BX_OFF,
+  BX_STL,
+  BX_VTP,
+  BX_VTU,
+  BX_SVG,
+  BX_JSON
+} bx_format;
+
+/* By the extension, in any case of letters; a last .gz is looked through when gz is not NULL, and then told. */
+bx_format bx_format_of(const char *path, bool *gz);
+
+/* Options, path and result pointer are there? INVALID otherwise. */
+batten_status bx_check_pointers(batten_context *ctx, const char *path, const void *out, const char *out_name);
+
+/* The readers behind the public calls, on any stream: what tests and fuzzers feed. */
+batten_status bx_read_points_from(bx_reader *r, bx_format format, unsigned n, batten_cloud *out);
+batten_status bx_read_mesh_from(bx_reader *r, bx_format format, batten_mesh **out);
+
+#endif
