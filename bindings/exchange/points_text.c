@@ -148,7 +148,7 @@ static batten_status begin_numbers(table *t, const char *line, size_t length) {
 }
 
 static batten_status fail_field(table *t, size_t column, field f) {
-  char name[24];
+  char name[40];
   snprintf(name, sizeof name, "column %zu", column + 1);
   /* "1,5 2,5": cut at the commas, a field holds two numbers. */
   for (size_t i = 0; t->separator == ',' && i < f.length; i++)

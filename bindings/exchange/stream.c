@@ -263,7 +263,7 @@ batten_status bx_next_line(bx_reader *r, bool *end) {
   size_t there = r->end - r->begin, taken = length;
   if (length < there && line[length] == 0)
     return bx_fail_line(r, "a byte of value 0 in column %zu; is this a text file in UTF-8 or ASCII?", length + 1);
-  if (length < there) taken += 1 + (line[length] == '\r' && length + 1 < there && line[length + 1] == '\n');
+  if (length < there) taken += line[length] == '\r' && length + 1 < there && line[length + 1] == '\n' ? 2 : 1;
   *end = there == 0;
   line[length] = '\0'; /* on the line's end, or on the spare byte behind the window */
   r->text = (char *)line;
