@@ -48,12 +48,13 @@ BATTEN_API batten_spline_options batten_spline_options_default(void);
 typedef struct batten_spline_info {
   batten_saddle_info saddle;
   double residual_max;  /* max |U(x_i) - v_i| / (max v - min v), recomputed by the evaluator; with smoothing
-                           against v_i - rho w_i */
+                           against v_i - rho w_i. Where all v are equal: over the largest |gradient| times the
+                           unit box's side, else over |v| */
   double gradient_residual_max; /* the same for gradients, relative to the largest |gradient|; 0 without */
   double loo_rms;       /* root mean square of U_without_i(x_i) - v_i over the sample, unit of the values; NaN when
-                           not computed (loo_samples = 0 or smoothing per point) */
-  size_t loo_samples;   /* how many */
-  double energy;        /* w' K w: the minimised energy up to its constant, unit box */
+                           not computed (loo_samples = 0, or N + nM = k) */
+  size_t loo_samples;   /* how many; points without which the polynomial part is undetermined are left out */
+  double energy;        /* w' K w: the minimised energy up to its constant; unit box, values squared */
   double time_total_s;
 } batten_spline_info;
 
@@ -62,8 +63,10 @@ BATTEN_API size_t batten_spline_bytes(batten_saddle_method method, unsigned n, u
                                       size_t gradients);
 
 /* Fits; *out is freed by batten_spline_free and untouched on failure; info may be NULL.
- * Fails: INVALID (2m <= n, non-finite, equal points: names both), TOO_LARGE, NOMEM, SINGULAR (points on a line,
- * plane or other zero set of the polynomial part: names it), CANCELLED. Time O((N + nM)^3 / 3). */
+ * Positive status: BATTEN_W_ACCURACY when residual_max or gradient_residual_max is above 1e-10.
+ * Fails: INVALID (2m <= n, non-finite, equal points: names both, fewer conditions than monomials), TOO_LARGE, NOMEM,
+ * SINGULAR (points on a line or plane: names it; or nearly on one another or on the zero set of a polynomial of degree
+ * m-1), CANCELLED. Time O((N + nM)^3 / 3). */
 BATTEN_API batten_status batten_spline_fit(batten_context *ctx, const batten_spline_data *data,
                                            const batten_spline_options *opt, batten_spline **out,
                                            batten_spline_info *info);
@@ -89,8 +92,9 @@ BATTEN_API batten_status batten_spline_create(batten_context *ctx, const batten_
                                               batten_spline **out);
 
 /* points [count][n]; values [count], gradients [count][n], hessians [count][n][n]; each may be NULL.
- * Threaded and vectorised; the same bits for any thread count and any batch. Derivatives that do not exist
- * at a centre (r^1: gradient; r^3 with gradient data: Hessian) are evaluated as if its term were 0. */
+ * Threaded and vectorised; the same bits for any thread count, any batch and any instruction set. Derivatives that do
+ * not exist at a centre (r^1: gradient; r^3 with gradient data: Hessian) are evaluated as if its term were 0. Points
+ * that are not finite give NaN. Progress (phase "evaluate") only in batches that take long. */
 BATTEN_API batten_status batten_spline_evaluate(batten_context *ctx, const batten_spline *s, size_t count,
                                                 const double *points, double *values, double *gradients,
                                                 double *hessians);
