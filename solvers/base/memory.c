@@ -68,3 +68,8 @@ void *batten_realloc_array(batten_context *ctx, void *block, size_t count, size_
 size_t batten_bytes_in_use(const batten_context *ctx) { return ctx->bytes; }
 size_t batten_bytes_peak(const batten_context *ctx) { return ctx->bytes_peak; }
 void batten_bytes_peak_reset(batten_context *ctx) { ctx->bytes_peak = ctx->bytes; }
+
+size_t batten_bytes_available(const batten_context *ctx) {
+  size_t limit = ctx->options.memory_limit;
+  return limit == 0 ? SIZE_MAX : limit > ctx->bytes ? limit - ctx->bytes : 0;
+}

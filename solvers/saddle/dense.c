@@ -109,11 +109,12 @@ batten_status batten_saddle_dense_factor(batten_saddle *s, batten_saddle_method 
   if (st < 0) goto done;
   double assembled = batten_now();
   s->info.time_assemble_s = assembled - start;
+  s->info.time_project_s = 0;
   st = batten_progress(s->ctx, "factor", 0);
   if (st < 0) goto done;
   st = method == BATTEN_SADDLE_QR ? factor_qr(s) : factor_ldl(s);
   s->info.time_factor_s = batten_now() - assembled;
-  s->info.bytes = batten_saddle_dense_bytes(method, s->matrix.n, s->matrix.k);
+  s->info.bytes = order * (order * sizeof *s->a + (s->tau ? sizeof *s->tau : sizeof *s->pivots));
 done:
   if (st < 0) batten_saddle_dense_free(s);
   return st;

@@ -1,8 +1,18 @@
-/* Householder projection onto the null space of P'. */
+/* Householder projection onto the null space of P', and Cholesky there.
+ *
+ * P S = Q [R; 0] Pi' with Q = I - V T V' from k reflectors. With w = Q u the second block row says R' u1 = 0, and
+ * B = Q' K Q splits into a positive definite system for u2 and a small one for c:
+ *     b22 u2 = (Q'f)_2,    R Pi' c = (Q'f)_1 - b21' u2.
+ * B comes from one triangle of K in two level-3 calls (LAPACK's own two-sided update, Dongarra, Sorensen, Hammarling
+ * 1989):  Y = K V T,  M = T' V' Y,  X = Y - V M / 2,  B = K - V X' - X V'.
+ * The first k columns of B stay in double, b22 in packed storage of the precision asked for. */
 #include <float.h>
 #include <string.h>
 
+#include "rfp.h"
 #include "system.h"
+
+static const batten_la_real D = BATTEN_LA_DOUBLE;
 
 /* ---- QR of P ---- */
 
@@ -62,5 +72,309 @@ batten_status batten_saddle_qr_new(batten_saddle *s) {
 done:
   batten_free(s->ctx, tau);
   if (st < 0) batten_saddle_qr_free(s);
+  return st;
+}
+
+/* x := Q x or Q' x for m columns, x [m][N]; work [2][k]. Column by column: m is small or k is. */
+static void apply_q(const batten_saddle *s, bool transposed, size_t m, double *x, double *work) {
+  size_t n = s->matrix.n, k = s->matrix.k;
+  double *projected = work, *combined = work + k;
+  for (size_t j = 0; j < m && k > 0; j++) {
+    double *column = x + j * n;
+    batten_la_gemv(D, 'T', n, k, 1, s->qr.v, n, column, 0, projected);
+    batten_la_gemv(D, transposed ? 'T' : 'N', k, k, 1, s->qr.t, k, projected, 0, combined);
+    batten_la_gemv(D, 'N', n, k, -1, s->qr.v, n, combined, 1, column);
+  }
+}
+
+/* to := from, rounded to real. */
+static void copy_to(batten_la_real real, size_t count, const double *from, double factor, void *to) {
+  if (real == BATTEN_LA_DOUBLE) {
+    double *d = to;
+    for (size_t i = 0; i < count; i++) d[i] = factor * from[i];
+  } else {
+    float *f = to;
+    for (size_t i = 0; i < count; i++) f[i] = (float)(factor * from[i]);
+  }
+}
+
+static void copy_from(batten_la_real real, size_t count, const void *from, double factor, double *to) {
+  if (real == BATTEN_LA_DOUBLE) {
+    const double *d = from;
+    for (size_t i = 0; i < count; i++) to[i] = factor * d[i];
+  } else {
+    const float *f = from;
+    for (size_t i = 0; i < count; i++) to[i] = factor * (double)f[i];
+  }
+}
+
+static batten_rfp trailing(const batten_saddle *s) {
+  return batten_rfp_view(s->real, s->matrix.n - s->matrix.k, s->rfp);
+}
+
+/* ---- Assembly ---- */
+
+typedef struct assembly {
+  const batten_saddle *s;
+  batten_rfp b22;
+} assembly;
+
+/* Tiles do not straddle k and k + n1: each lies in the head, in the trapezoid, or (across) in the upper triangle. */
+static void store_tile(void *arg, size_t worker, const batten_saddle_tile *t) {
+  const assembly *d = arg;
+  const batten_rfp *b = &d->b22;
+  const batten_saddle *s = d->s;
+  size_t k = s->matrix.k;
+  (void)worker;
+  if (t->across) {
+    size_t col = t->col0 - k - b->n1, row = t->row0 - k - b->n1;
+    for (size_t i = 0; i < t->rows; i++) {
+      size_t count = t->row0 == t->col0 ? i + 1 : t->cols;
+      copy_to(b->real, count, t->data + i * t->ld, s->scale, batten_la_at(b->real, b->b22, col + (row + i) * b->ld));
+    }
+    return;
+  }
+  for (size_t j = 0; j < t->cols; j++) {
+    size_t col = t->col0 + j;
+    if (col < k) {
+      copy_to(D, t->rows, t->data + j * t->ld, s->scale, s->head + t->row0 + col * s->matrix.n);
+      continue;
+    }
+    size_t skip = t->row0 == t->col0 ? j : 0;
+    copy_to(b->real, t->rows - skip, t->data + skip + j * t->ld, s->scale,
+            batten_la_at(b->real, b->b11, t->row0 + skip - k + (col - k) * b->ld));
+  }
+}
+
+static batten_status assemble(batten_saddle *s) {
+  assembly d = {.s = s, .b22 = trailing(s)};
+  size_t k = s->matrix.k, breaks[2] = {k, k + d.b22.n1};
+  batten_status st = batten_saddle_walk(s, "assembly", breaks, true, store_tile, &d);
+  for (size_t j = 0; j < k && st == BATTEN_OK; j++) /* blocks above the diagonal, when k spans several */
+    for (size_t i = 0; i < j; i++) s->head[i + j * s->matrix.n] = s->head[j + i * s->matrix.n];
+  return st;
+}
+
+/* ---- Projection ---- */
+
+/* head and b22 := the blocks of Q' s K Q. */
+static batten_status project(batten_saddle *s) {
+  size_t n = s->matrix.n, k = s->matrix.k, rest = n - k;
+  if (k == 0) return BATTEN_OK;
+  batten_rfp b22 = trailing(s);
+  batten_status st = BATTEN_E_NOMEM;
+  double *y = NULL, *m = NULL;
+  void *rounded = NULL;
+  double *z = batten_alloc_array(s->ctx, n * k, sizeof *z);
+  if (!z) goto done;
+  y = batten_alloc_array(s->ctx, n * k, sizeof *y);
+  if (!y) goto done;
+  m = batten_alloc_array(s->ctx, k * k, 2 * sizeof *m);
+  if (!m) goto done;
+  rounded = batten_alloc_array(s->ctx, rest * k, 2 * (size_t)s->real); /* two blocks in b22's precision */
+  if (!rounded) goto done;
+  double *vy = m + k * k;
+  void *first = rounded, *second = batten_la_at(s->real, rounded, rest * k);
+
+  /* Z = V T, Y = K Z with K = [head, [b21'; b22]]. */
+  batten_la_gemm(D, 'N', 'N', n, k, k, 1, s->qr.v, n, s->qr.t, k, 0, z, n);
+  for (size_t j = 0; j < k; j++) copy_to(s->real, rest, z + k + j * n, 1, batten_la_at(s->real, first, j * rest));
+  batten_rfp_symm(&b22, k, first, rest, second, rest);
+  for (size_t j = 0; j < k; j++) {
+    memset(y + j * n, 0, k * sizeof *y);
+    copy_from(s->real, rest, batten_la_at_const(s->real, second, j * rest), 1, y + k + j * n);
+  }
+  batten_la_gemm(D, 'N', 'N', n, k, k, 1, s->head, n, z, n, 1, y, n);
+  batten_la_gemm(D, 'T', 'N', k, k, rest, 1, s->head + k, n, z + k, n, 1, y, n);
+
+  /* M = T' (V' Y), X = Y - V M / 2 in y. */
+  batten_la_gemm(D, 'T', 'N', k, k, n, 1, s->qr.v, n, y, n, 0, vy, k);
+  batten_la_gemm(D, 'T', 'N', k, k, k, 1, s->qr.t, k, vy, k, 0, m, k);
+  batten_la_gemm(D, 'N', 'N', n, k, k, -0.5, s->qr.v, n, m, k, 1, y, n);
+
+  batten_la_gemm(D, 'N', 'T', n, k, k, -1, s->qr.v, n, y, n, 1, s->head, n);
+  batten_la_gemm(D, 'N', 'T', n, k, k, -1, y, n, s->qr.v, n, 1, s->head, n);
+  for (size_t j = 0; j < k; j++) {
+    copy_to(s->real, rest, s->qr.v + k + j * n, 1, batten_la_at(s->real, first, j * rest));
+    copy_to(s->real, rest, y + k + j * n, 1, batten_la_at(s->real, second, j * rest));
+  }
+  batten_rfp_syr2k(&b22, k, first, rest, second, rest);
+  st = BATTEN_OK;
+done:
+  batten_free(s->ctx, rounded);
+  batten_free(s->ctx, m);
+  batten_free(s->ctx, y);
+  batten_free(s->ctx, z);
+  return st;
+}
+
+/* ---- Factor ---- */
+
+typedef struct inverse {
+  batten_rfp b22;
+  void *rounded; /* [N-k] in b22's precision */
+} inverse;
+
+/* x := b22^-1 x. x is brought to size 1 first, so that a small residual survives in float. */
+static void apply_inverse(void *arg, double *x) {
+  inverse *v = arg;
+  double largest = 0;
+  for (size_t i = 0; i < v->b22.n; i++) largest = fmax(largest, fabs(x[i]));
+  if (!(largest > 0 && largest <= DBL_MAX)) return;
+  double unit = ldexp(1, -ilogb(largest));
+  copy_to(v->b22.real, v->b22.n, x, unit, v->rounded);
+  batten_rfp_forward(&v->b22, 1, v->rounded, v->b22.n);
+  batten_rfp_backward(&v->b22, 1, v->rounded, v->b22.n);
+  copy_from(v->b22.real, v->b22.n, v->rounded, 1 / unit, x);
+}
+
+/* rcond from the norm of b22 and its factor; SINGULAR when solves would have no correct digit left. */
+static batten_status condition(batten_saddle *s, double norm) {
+  inverse v = {.b22 = trailing(s)};
+  double inverse_norm = 0;
+  v.rounded = batten_alloc_array(s->ctx, v.b22.n, (size_t)s->real);
+  if (!v.rounded) return BATTEN_E_NOMEM;
+  batten_status st = batten_la_norm1_estimate(s->ctx, v.b22.n, apply_inverse, &v, &inverse_norm);
+  batten_free(s->ctx, v.rounded);
+  if (st < 0) return st;
+  s->info.rcond = v.b22.n == 0 ? 1 : 1 / (norm * inverse_norm);
+  /* Refinement gains a digit a step while eps / rcond is well below 1. */
+  double limit = s->real == BATTEN_LA_DOUBLE ? DBL_EPSILON : 4 * (double)FLT_EPSILON;
+  if (!(s->info.rcond >= limit))
+    return batten_fail(s->ctx, BATTEN_E_SINGULAR, "projected matrix: rcond %.3g is below %.3g", s->info.rcond, limit);
+  return BATTEN_OK;
+}
+
+size_t batten_saddle_project_bytes(batten_la_real real, size_t n, size_t k) {
+  size_t rest = n - k, packed, head, bytes;
+  if (!batten_rfp_count(rest, &packed) || !batten_mul(packed, (size_t)real, &packed) ||
+      !batten_mul3(n, k, sizeof(double), &head))
+    return SIZE_MAX;
+  size_t walk = batten_saddle_walk_bytes(n);
+  size_t projection = 2 * head + 2 * k * k * sizeof(double) + 2 * rest * k * (size_t)real;
+  size_t norms = rest * (2 * sizeof(double) + sizeof(batten_la_int) + (size_t)real);
+  size_t scratch = walk > projection ? walk : projection;
+  if (norms > scratch) scratch = norms;
+  return batten_add(packed, head, &bytes) & batten_add(bytes, scratch, &bytes) ? bytes : SIZE_MAX;
+}
+
+batten_status batten_saddle_project_factor(batten_saddle *s, batten_la_real real) {
+  size_t n = s->matrix.n, k = s->matrix.k, count = 0, failed;
+  double start = batten_now();
+  batten_status st = BATTEN_E_NOMEM;
+  double *sums = NULL;
+  batten_rfp_count(n - k, &count);
+  s->real = real;
+  s->head = batten_alloc_array(s->ctx, n * k, sizeof *s->head);
+  if (!s->head) goto done;
+  s->rfp = batten_alloc_array(s->ctx, count, (size_t)real);
+  if (!s->rfp) goto done;
+  st = assemble(s);
+  if (st < 0) goto done;
+  double assembled = batten_now();
+  s->info.time_assemble_s = assembled - start;
+
+  st = batten_progress(s->ctx, "projection", 0);
+  if (st < 0) goto done;
+  st = project(s);
+  if (st < 0) goto done;
+  double projected = batten_now();
+  s->info.time_project_s = projected - assembled;
+
+  batten_rfp b22 = trailing(s);
+  st = BATTEN_E_NOMEM;
+  sums = batten_alloc_array(s->ctx, n - k, sizeof *sums);
+  if (!sums) goto done;
+  double norm = batten_rfp_norm1(&b22, sums);
+  st = batten_rfp_cholesky(s->ctx, &b22, &failed);
+  if (st < 0) goto done;
+  batten_free(s->ctx, sums);
+  sums = NULL;
+  st = condition(s, norm);
+  s->info.time_factor_s = batten_now() - projected;
+  s->info.bytes = count * (size_t)real + n * k * sizeof(double);
+done:
+  batten_free(s->ctx, sums);
+  if (st < 0) batten_saddle_project_free(s);
+  return st;
+}
+
+void batten_saddle_project_free(batten_saddle *s) {
+  batten_free(s->ctx, s->head);
+  batten_free(s->ctx, s->rfp);
+  s->head = NULL;
+  s->rfp = NULL;
+}
+
+/* ---- Solve ---- */
+
+batten_status batten_saddle_project_solve(const batten_saddle *s, double *b) {
+  size_t n = s->matrix.n, k = s->matrix.k;
+  const batten_saddle_qr *qr = &s->qr;
+  inverse v = {.b22 = trailing(s)};
+  batten_status st = BATTEN_E_NOMEM;
+  double *small = batten_alloc_array(s->ctx, k, 4 * sizeof *small);
+  if (!small) goto done;
+  v.rounded = batten_alloc_array(s->ctx, n - k, (size_t)s->real);
+  if (!v.rounded) goto done;
+  double *work = small, *u1 = small + 2 * k, *g1 = small + 3 * k, *u2 = b + k;
+
+  apply_q(s, true, 1, b, work);
+  for (size_t j = 0; j < k; j++) {
+    u1[j] = b[n + qr->pivots[j]];
+    g1[j] = b[j];
+  }
+  /* R' u1 = Pi' b2 (rounding only, in a refinement step), then b22 u2 = g2 - b21 u1. */
+  batten_la_trsv(D, 'U', 'T', k, qr->r, k, u1);
+  batten_la_gemv(D, 'N', n - k, k, -1, s->head + k, n, u1, 1, u2);
+  apply_inverse(&v, u2);
+  /* R Pi' c = g1 - b11 u1 - b21' u2. */
+  batten_la_gemv(D, 'N', k, k, -1, s->head, n, u1, 1, g1);
+  batten_la_gemv(D, 'T', n - k, k, -1, s->head + k, n, u2, 1, g1);
+  batten_la_trsv(D, 'U', 'N', k, qr->r, k, g1);
+  for (size_t j = 0; j < k; j++) {
+    b[j] = u1[j];
+    b[n + qr->pivots[j]] = g1[j];
+  }
+  apply_q(s, false, 1, b, work);
+  st = BATTEN_OK;
+done:
+  batten_free(s->ctx, v.rounded);
+  batten_free(s->ctx, small);
+  return st;
+}
+
+batten_status batten_saddle_project_diagonal(const batten_saddle *s, size_t count, const size_t *index,
+                                             double *diagonal) {
+  size_t n = s->matrix.n, k = s->matrix.k, rest = n - k;
+  batten_rfp b22 = trailing(s);
+  batten_status st = BATTEN_E_NOMEM;
+  double *work = NULL;
+  void *rounded = NULL;
+  double *unit = batten_alloc_array(s->ctx, n, sizeof *unit);
+  if (!unit) goto done;
+  work = batten_alloc_array(s->ctx, k, 2 * sizeof *work);
+  if (!work) goto done;
+  rounded = batten_alloc_array(s->ctx, rest * count, (size_t)s->real);
+  if (!rounded) goto done;
+  /* The inverse is Q [0 0; 0 b22^-1] Q' in its first N rows, so its diagonal is |L^-1 (Q' e_i)_2|^2. */
+  for (size_t q = 0; q < count; q++) {
+    memset(unit, 0, n * sizeof *unit);
+    unit[index[q]] = 1;
+    apply_q(s, true, 1, unit, work);
+    copy_to(s->real, rest, unit + k, 1, batten_la_at(s->real, rounded, q * rest));
+  }
+  batten_rfp_forward(&b22, count, rounded, rest);
+  for (size_t q = 0; q < count; q++) {
+    double sum = 0;
+    copy_from(s->real, rest, batten_la_at_const(s->real, rounded, q * rest), 1, unit);
+    for (size_t i = 0; i < rest; i++) sum += unit[i] * unit[i];
+    diagonal[q] = sum;
+  }
+  st = BATTEN_OK;
+done:
+  batten_free(s->ctx, rounded);
+  batten_free(s->ctx, work);
+  batten_free(s->ctx, unit);
   return st;
 }

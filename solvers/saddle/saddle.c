@@ -28,17 +28,51 @@ batten_saddle_options batten_saddle_options_default(void) {
 
 /* ---- Memory and choice of method ---- */
 
+/* From this order on the float factor saves more than the extra residuals cost (measured, benchmarks/bench_saddle). */
+enum { MIXED_FROM = 1500 };
+
+static size_t qr_bytes(size_t n, size_t k) { return k * (n + 2 * k) * sizeof(double) + k * sizeof(size_t); }
+
 static size_t handle_bytes(size_t k) { return sizeof(batten_saddle) + k * sizeof(double); }
 
 size_t batten_saddle_bytes(batten_saddle_method method, size_t n, size_t k) {
   size_t order, bytes;
-  if (!batten_add(n, k, &order) || order > SIZE_MAX / 64) return SIZE_MAX;
-  bytes = batten_saddle_dense_bytes(method, n, k);
-  return batten_add(bytes, handle_bytes(k), &bytes) ? bytes : SIZE_MAX;
+  if (k > n || !batten_add(n, k, &order) || !batten_la_fits(order)) return SIZE_MAX;
+  bool dense = method == BATTEN_SADDLE_LDL || method == BATTEN_SADDLE_QR;
+  if (dense)
+    bytes = batten_saddle_dense_bytes(method, n, k);
+  else
+    bytes = batten_saddle_project_bytes(
+        method == BATTEN_SADDLE_CHOLESKY_MIXED ? BATTEN_LA_FLOAT : BATTEN_LA_DOUBLE, n, k);
+  size_t fixed = handle_bytes(k) + (dense ? 0 : qr_bytes(n, k));
+  return batten_add(bytes, fixed, &bytes) ? bytes : SIZE_MAX;
+}
+
+/* What the context still allows for a factor; what the handle itself holds is part of the prediction. */
+static size_t allowed_bytes(const batten_saddle *s) {
+  size_t own = handle_bytes(s->matrix.k) + (s->qr.v ? qr_bytes(s->matrix.n, s->matrix.k) : 0), allowed;
+  batten_add(batten_bytes_available(s->ctx), own, &allowed);
+  return allowed;
+}
+
+static bool fits(const batten_saddle *s, batten_saddle_method method) {
+  return batten_saddle_bytes(method, s->matrix.n, s->matrix.k) <= allowed_bytes(s);
 }
 
 static batten_saddle_method first_method(const batten_saddle *s) {
-  return s->options.method == BATTEN_SADDLE_QR ? BATTEN_SADDLE_QR : BATTEN_SADDLE_LDL;
+  if (s->options.method != BATTEN_SADDLE_AUTO) return s->options.method;
+  bool mixed_pays = s->matrix.n >= MIXED_FROM && !s->options.smooth_kernel;
+  if (mixed_pays || !fits(s, BATTEN_SADDLE_CHOLESKY)) return BATTEN_SADDLE_CHOLESKY_MIXED;
+  return BATTEN_SADDLE_CHOLESKY;
+}
+
+static batten_status too_large(const batten_saddle *s, batten_saddle_method method, const char *reason) {
+  return batten_fail(s->ctx, BATTEN_E_TOO_LARGE,
+                     "matrix.n: %zu rows by %s take %zu bytes, the context allows %zu%s%s; raise memory_limit, use fewer "
+                     "points or method cholesky-mixed",
+                     s->matrix.n, batten_saddle_method_name(method),
+                     batten_saddle_bytes(method, s->matrix.n, s->matrix.k), allowed_bytes(s), *reason ? ", and " : "",
+                     reason);
 }
 
 /* The method to try after `method`; AUTO when there is none. */
@@ -52,19 +86,39 @@ static batten_saddle_method next_method(batten_saddle_method method) {
 
 /* ---- Factor ---- */
 
+static void free_factor(batten_saddle *s) {
+  batten_saddle_project_free(s);
+  batten_saddle_dense_free(s);
+  s->factored = false;
+}
+
 static batten_status factor_with(batten_saddle *s, batten_saddle_method method) {
+  bool mixed = method == BATTEN_SADDLE_CHOLESKY_MIXED;
+  free_factor(s);
   s->info.method = method;
-  return batten_saddle_dense_factor(s, method);
+  if (method == BATTEN_SADDLE_LDL || method == BATTEN_SADDLE_QR) {
+    batten_saddle_qr_free(s);
+    return batten_saddle_dense_factor(s, method);
+  }
+  if (s->matrix.k > 0 && !s->qr.v) {
+    batten_status st = batten_saddle_qr_new(s);
+    if (st < 0) return st;
+  }
+  return batten_saddle_project_factor(s, mixed ? BATTEN_LA_FLOAT : BATTEN_LA_DOUBLE);
 }
 
 /* Factors by method, or by the first after it that works. */
 static batten_status factor_from(batten_saddle *s, batten_saddle_method method) {
-  s->factored = false;
   for (;;) {
     batten_status st = factor_with(s, method);
     batten_saddle_method next = next_method(method);
-    if (st == BATTEN_OK) s->factored = true;
+    s->factored = st == BATTEN_OK;
     if (st != BATTEN_E_SINGULAR || next == BATTEN_SADDLE_AUTO) return st;
+    if (!fits(s, next)) {
+      if (method == BATTEN_SADDLE_CHOLESKY_MIXED) return too_large(s, next, batten_error(s->ctx));
+      return batten_fail(s->ctx, BATTEN_E_SINGULAR, "%s; merge duplicate points or check the kernel's sign",
+                         batten_error(s->ctx));
+    }
     s->info.fallbacks++;
     method = next;
   }
@@ -122,12 +176,17 @@ batten_status batten_saddle_factor(batten_context *ctx, const batten_saddle_matr
   st = BATTEN_E_NOMEM;
   s->p_scale = batten_alloc_array(ctx, matrix->k, sizeof *s->p_scale);
   if (!s->p_scale) goto done;
+  batten_saddle_method method = first_method(s);
+  if (!fits(s, method)) {
+    st = too_large(s, method, "");
+    goto done;
+  }
   scale_p(s);
   st = batten_saddle_probe_scale(s);
   if (st < 0) goto done;
-  st = batten_saddle_qr_new(s);
+  st = batten_saddle_qr_new(s); /* for LDL' and QR too: it tells dependent columns of P from other troubles */
   if (st < 0) goto done;
-  st = factor_from(s, first_method(s));
+  st = factor_from(s, method);
 done:
   if (st < 0) batten_saddle_free(s);
   else *out = s;
@@ -136,7 +195,7 @@ done:
 
 void batten_saddle_free(batten_saddle *s) {
   if (!s) return;
-  batten_saddle_dense_free(s);
+  free_factor(s);
   batten_saddle_qr_free(s);
   batten_free(s->ctx, s->p_scale);
   batten_free(s->ctx, s);
@@ -151,7 +210,7 @@ static batten_status apply_factor(batten_saddle *s, double *b) {
   size_t n = s->matrix.n, k = s->matrix.k;
   for (size_t i = 0; i < n; i++) b[i] *= s->scale;
   for (size_t c = 0; c < k; c++) b[n + c] *= s->p_scale[c];
-  batten_status st = batten_saddle_dense_solve(s, 1, b);
+  batten_status st = s->a ? batten_saddle_dense_solve(s, 1, b) : batten_saddle_project_solve(s, b);
   for (size_t c = 0; c < k; c++) b[n + c] *= s->p_scale[c] / s->scale;
   return st;
 }
@@ -272,36 +331,40 @@ done:
 
 enum { RIGHT_SIDES = 64 }; /* solved at a time: enough for level-3 BLAS */
 
+/* diagonal of the inverse of the scaled matrix, by the whole factor: full solves. */
+static batten_status dense_diagonal(const batten_saddle *s, size_t count, const size_t *index, double *diagonal) {
+  size_t order = batten_saddle_order(s);
+  double *b = batten_alloc_array(s->ctx, order * count, sizeof *b);
+  if (!b) return BATTEN_E_NOMEM;
+  memset(b, 0, order * count * sizeof *b);
+  for (size_t q = 0; q < count; q++) b[index[q] + q * order] = 1;
+  batten_status st = batten_saddle_dense_solve(s, count, b);
+  for (size_t q = 0; q < count; q++) diagonal[q] = b[index[q] + q * order];
+  batten_free(s->ctx, b);
+  return st;
+}
+
 batten_status batten_saddle_inverse_diagonal(batten_context *ctx, batten_saddle *s, size_t count, const size_t *index,
                                              double *diagonal) {
   if (!ctx) return BATTEN_E_INVALID;
   if (!s) return batten_fail(ctx, BATTEN_E_INVALID, "s: NULL; make it with batten_saddle_factor()");
   if (count > 0 && (!index || !diagonal))
     return batten_fail(ctx, BATTEN_E_INVALID, "%s: NULL", index ? "diagonal" : "index");
-  size_t n = s->matrix.n, order = batten_saddle_order(s);
+  size_t n = s->matrix.n;
   for (size_t q = 0; q < count; q++)
     if (index[q] >= n) return batten_fail(ctx, BATTEN_E_INVALID, "index[%zu]: %zu; must be below %zu", q, index[q], n);
-  if (count == 0) return BATTEN_OK;
 
-  batten_status st = BATTEN_E_NOMEM;
-  size_t columns = count < RIGHT_SIDES ? count : RIGHT_SIDES;
-  double *result = NULL, *b = batten_alloc_array(ctx, order * columns, sizeof *b);
-  if (!b) goto done;
-  result = batten_alloc_array(ctx, count, sizeof *result);
-  if (!result) goto done;
-  st = s->factored ? BATTEN_OK : factor_from(s, s->info.method);
-  for (size_t first = 0; first < count && st == BATTEN_OK; first += columns) {
-    size_t these = count - first < columns ? count - first : columns;
+  double *result = batten_alloc_array(ctx, count, sizeof *result);
+  if (!result) return BATTEN_E_NOMEM;
+  batten_status st = s->factored ? BATTEN_OK : factor_from(s, s->info.method);
+  for (size_t first = 0; first < count && st == BATTEN_OK; first += RIGHT_SIDES) {
+    size_t these = count - first < RIGHT_SIDES ? count - first : RIGHT_SIDES;
     st = batten_progress(ctx, "leave-one-out", (double)first / (double)count);
     if (st < 0) break;
-    memset(b, 0, order * these * sizeof *b);
-    for (size_t q = 0; q < these; q++) b[index[first + q] + q * order] = 1;
-    st = batten_saddle_dense_solve(s, these, b);
-    for (size_t q = 0; q < these; q++) result[first + q] = s->scale * b[index[first + q] + q * order];
+    st = s->a ? dense_diagonal(s, these, index + first, result + first)
+              : batten_saddle_project_diagonal(s, these, index + first, result + first);
   }
-  if (st == BATTEN_OK) memcpy(diagonal, result, count * sizeof *diagonal);
-done:
+  for (size_t q = 0; q < count && st == BATTEN_OK; q++) diagonal[q] = s->scale * result[q];
   batten_free(ctx, result);
-  batten_free(ctx, b);
   return st;
 }

@@ -83,6 +83,17 @@ batten_status batten_saddle_product(const batten_saddle *s, bool absolute, const
 batten_status batten_saddle_qr_new(batten_saddle *s);
 void batten_saddle_qr_free(batten_saddle *s);
 
+/* Projection and Cholesky in double or float. SINGULAR when the projected matrix is not positive definite to that
+ * precision. */
+size_t batten_saddle_project_bytes(batten_la_real real, size_t n, size_t k);
+batten_status batten_saddle_project_factor(batten_saddle *s, batten_la_real real);
+/* b [N+k] := inverse of the scaled matrix * b. */
+batten_status batten_saddle_project_solve(const batten_saddle *s, double *b);
+/* diagonal[q] = (inverse of the scaled matrix)[index[q]][index[q]]; count at most 64 or so at a time. */
+batten_status batten_saddle_project_diagonal(const batten_saddle *s, size_t count, const size_t *index,
+                                             double *diagonal);
+void batten_saddle_project_free(batten_saddle *s);
+
 /* ---- dense.c ---- */
 
 size_t batten_saddle_dense_bytes(batten_saddle_method method, size_t n, size_t k);

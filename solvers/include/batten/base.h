@@ -106,6 +106,9 @@ BATTEN_API size_t batten_bytes_in_use(const batten_context *ctx);
 BATTEN_API size_t batten_bytes_peak(const batten_context *ctx);
 BATTEN_API void batten_bytes_peak_reset(batten_context *ctx);
 
+/* Bytes that the context may still take under its memory_limit, SIZE_MAX without one. */
+BATTEN_API size_t batten_bytes_available(const batten_context *ctx);
+
 BATTEN_API unsigned batten_threads(const batten_context *ctx);
 
 /* The same hooks for code that is written on top of batten (batten's own file library uses them). */
