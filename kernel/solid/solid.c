@@ -1,0 +1,215 @@
+/* A solid: a spline, a carrier and a sign. Making, sharing, evaluating; the fit is in solid_fit.c. */
+#include <math.h>
+#include <string.h>
+
+#include "base/checked.h"
+#include "solid/solid_inner.h"
+
+/* ---- evaluating ---------------------------------------------------------------------------------- */
+
+/* out = sign (carrier - out) */
+static void combine(int sign, size_t count, const double *carrier, double *out) {
+  for (size_t i = 0; i < count; i++) out[i] = sign * (carrier[i] - out[i]);
+}
+
+batten_status batten_solid_evaluate(batten_context *ctx, const batten_solid *s, size_t count, const double *points,
+                                    double *values, double *gradients, double *hessians) {
+  if (!s) return batten_fail(ctx, BATTEN_E_INVALID, "solid: NULL; give a solid");
+  if (count == 0) return BATTEN_OK;
+  size_t n = s->n, numbers;
+  if (!points) return batten_fail(ctx, BATTEN_E_INVALID, "points: NULL; give [%zu][%u] numbers", count, s->n);
+  size_t each = (values ? 1 : 0) + (gradients ? n : 0) + (hessians ? n * n : 0);
+  if (!batten_mul(count, each, &numbers)) return batten_fail(ctx, BATTEN_E_TOO_LARGE, "count: %zu; too many", count);
+  /* The carrier goes first, aside: what it says may be an error of the host's. */
+  double *aside = batten_alloc_array(ctx, numbers, sizeof *aside), *next = aside;
+  if (!aside) return BATTEN_E_NOMEM;
+  double *f = values ? next : NULL;
+  next += values ? count : 0;
+  double *df = gradients ? next : NULL;
+  next += gradients ? count * n : 0;
+  double *ddf = hessians ? next : NULL;
+  batten_status st = batten_carrier_evaluate(ctx, s->carrier, count, points, f, df, ddf);
+  if (st >= 0) st = batten_spline_evaluate(ctx, s->spline, count, points, values, gradients, hessians);
+  if (st >= 0 && f) combine(s->sign, count, f, values);
+  if (st >= 0 && df) combine(s->sign, count * n, df, gradients);
+  if (st >= 0 && ddf) combine(s->sign, count * n * n, ddf, hessians);
+  batten_free(ctx, aside);
+  return st;
+}
+
+static batten_status evaluate_field(const void *user, batten_context *ctx, size_t count, const double *points,
+                                    double *values, double *gradients, double *hessians) {
+  return batten_solid_evaluate(ctx, user, count, points, values, gradients, hessians);
+}
+
+batten_field batten_solid_field(const batten_solid *s) {
+  return (batten_field){.dimension = s->n, .order = 2, .evaluate = evaluate_field, .user = s};
+}
+
+/* ---- making -------------------------------------------------------------------------------------- */
+
+batten_status batten_solid_new(batten_context *ctx, batten_spline *spline, batten_carrier *carrier, int sign,
+                               size_t count, const double *points, const double *lower, const double *upper,
+                               batten_solid **out) {
+  batten_spline_parts parts;
+  batten_spline_get_parts(spline, &parts);
+  batten_solid *s = batten_alloc(ctx, sizeof *s);
+  double *copy = batten_alloc_array(ctx, count, parts.n * sizeof *copy);
+  if (!s || !copy) {
+    batten_free(ctx, s);
+    batten_free(ctx, copy);
+    return BATTEN_E_NOMEM;
+  }
+  memcpy(copy, points, count * parts.n * sizeof *copy);
+  *s = (batten_solid){.ctx = ctx, .owners = 1, .n = parts.n, .sign = sign, .count = count, .points = copy};
+  memcpy(s->lower, lower, parts.n * sizeof *lower);
+  memcpy(s->upper, upper, parts.n * sizeof *upper);
+  s->spline = batten_spline_retain(spline);
+  s->carrier = batten_carrier_retain(carrier);
+  *out = s;
+  return BATTEN_OK;
+}
+
+/* Keeps the centres at which f vanishes, in place: the others are points off the surface. A smoothed spline misses
+ * its data, so that too few vanish: then every centre stays. */
+static size_t keep_surface_points(unsigned n, size_t count, const double *f, const double *u, double *points) {
+  double largest = 0;
+  size_t kept = 0;
+  for (size_t i = 0; i < count; i++) largest = fmax(largest, fmax(fabs(f[i]), fabs(u[i])));
+  /* 1e-6: far above the residual of a fit, far below a pair's distance */
+  for (size_t i = 0; i < count; i++) kept += fabs(f[i]) <= 1e-6 * largest;
+  if (kept < count / 4) return count; /* a third are on the surface when every point has a pair */
+  kept = 0;
+  for (size_t i = 0; i < count; i++)
+    if (fabs(f[i]) <= 1e-6 * largest) memmove(points + kept++ * n, points + i * n, n * sizeof *points);
+  return kept;
+}
+
+batten_status batten_solid_create(batten_context *ctx, batten_spline *spline, batten_carrier *carrier, int sign,
+                                  const double *lower, const double *upper, batten_solid **out) {
+  if (!out) return batten_fail(ctx, BATTEN_E_INVALID, "out: NULL; give the place for the solid");
+  if (!spline || !carrier)
+    return batten_fail(ctx, BATTEN_E_INVALID, "%s: NULL; give one", spline ? "carrier" : "spline");
+  if (sign != 1 && sign != -1) return batten_fail(ctx, BATTEN_E_INVALID, "sign: %d; give 1 or -1", sign);
+  if (!lower || !upper)
+    return batten_fail(ctx, BATTEN_E_INVALID, "%s: NULL; give the box", lower ? "upper" : "lower");
+  batten_spline_parts parts;
+  batten_spline_get_parts(spline, &parts);
+  unsigned n = parts.n, of_carrier = batten_carrier_field(carrier).dimension;
+  if (of_carrier != n)
+    return batten_fail(ctx, BATTEN_E_INVALID, "carrier: of dimension %u, the spline's is %u", of_carrier, n);
+  for (unsigned i = 0; i < n; i++)
+    if (!isfinite(lower[i]) || !isfinite(upper[i]) || lower[i] > upper[i])
+      return batten_fail(ctx, BATTEN_E_INVALID, "lower[%u], upper[%u]: %g, %g; give finite bounds in order", i, i,
+                         lower[i], upper[i]);
+  batten_solid *s = NULL;
+  double *f = NULL, *u = NULL;
+  batten_status st = batten_solid_new(ctx, spline, carrier, sign, parts.count, parts.centers, lower, upper, &s);
+  if (st < 0) return st;
+  st = BATTEN_E_NOMEM;
+  f = batten_alloc_array(ctx, parts.count, sizeof *f);
+  u = batten_alloc_array(ctx, parts.count, sizeof *u);
+  if (!f || !u) goto done;
+  st = batten_solid_evaluate(ctx, s, s->count, s->points, f, NULL, NULL);
+  if (st >= 0) st = batten_spline_evaluate(ctx, spline, s->count, s->points, u, NULL, NULL);
+  if (st < 0) goto done;
+  s->count = keep_surface_points(n, s->count, f, u, s->points);
+  *out = s;
+  s = NULL;
+done:
+  batten_free(ctx, f);
+  batten_free(ctx, u);
+  batten_solid_free(s);
+  return st;
+}
+
+/* ---- another carrier ----------------------------------------------------------------------------- */
+
+enum { NEWTON_STEPS = 20 };
+
+/* Moves points onto f = 0 by Newton steps along the gradient, none longer than step_max. */
+static batten_status pull_to_surface(batten_context *ctx, const batten_solid *s, double step_max, double *points) {
+  unsigned n = s->n;
+  double *f = batten_alloc_array(ctx, s->count, sizeof *f), *df = batten_alloc_array(ctx, s->count, n * sizeof *df);
+  batten_status st = f && df ? BATTEN_OK : BATTEN_E_NOMEM;
+  for (unsigned round = 0; st >= 0 && round < NEWTON_STEPS; round++) {
+    st = batten_solid_evaluate(ctx, s, s->count, points, f, df, NULL);
+    for (size_t i = 0; st >= 0 && i < s->count; i++) {
+      double square = 0;
+      for (unsigned k = 0; k < n; k++) square += df[i * n + k] * df[i * n + k];
+      double length = sqrt(square), step = fabs(f[i]) / length;
+      if (!(step > 0) || !isfinite(step)) continue; /* there already, or no way known */
+      double scale = fmin(1, step_max / step) * f[i] / square;
+      for (unsigned k = 0; k < n; k++) points[i * n + k] -= scale * df[i * n + k];
+    }
+  }
+  batten_free(ctx, f);
+  batten_free(ctx, df);
+  return st;
+}
+
+static void box_of(unsigned n, size_t count, const double *points, double *lower, double *upper) {
+  for (unsigned k = 0; k < n; k++) {
+    lower[k] = INFINITY;
+    upper[k] = -INFINITY;
+    for (size_t i = 0; i < count; i++) {
+      lower[k] = fmin(lower[k], points[i * n + k]);
+      upper[k] = fmax(upper[k], points[i * n + k]);
+    }
+  }
+}
+
+batten_status batten_solid_with_carrier(batten_context *ctx, const batten_solid *solid, batten_carrier *carrier,
+                                        batten_solid **out) {
+  if (!out) return batten_fail(ctx, BATTEN_E_INVALID, "out: NULL; give the place for the solid");
+  if (!solid || !carrier)
+    return batten_fail(ctx, BATTEN_E_INVALID, "%s: NULL; give one", solid ? "carrier" : "solid");
+  unsigned of_carrier = batten_carrier_field(carrier).dimension;
+  if (of_carrier != solid->n)
+    return batten_fail(ctx, BATTEN_E_INVALID, "carrier: of dimension %u, the solid's is %u", of_carrier, solid->n);
+  batten_solid *s = NULL;
+  batten_status st = batten_solid_new(ctx, solid->spline, carrier, solid->sign, solid->count, solid->points,
+                                      solid->lower, solid->upper, &s);
+  if (st < 0) return st;
+  double diagonal = 0;
+  for (unsigned k = 0; k < s->n; k++) diagonal += (s->upper[k] - s->lower[k]) * (s->upper[k] - s->lower[k]);
+  /* A tenth of the diagonal: a step that stays on its side of the solid. */
+  st = pull_to_surface(ctx, s, 0.1 * sqrt(diagonal), s->points);
+  if (st < 0) {
+    batten_solid_free(s);
+    return st;
+  }
+  box_of(s->n, s->count, s->points, s->lower, s->upper);
+  *out = s;
+  return BATTEN_OK;
+}
+
+/* ---- sharing and looking ------------------------------------------------------------------------- */
+
+batten_solid *batten_solid_retain(batten_solid *s) {
+  if (s) s->owners++;
+  return s;
+}
+
+void batten_solid_free(batten_solid *s) {
+  if (!s || --s->owners > 0) return;
+  batten_spline_free(s->spline);
+  batten_carrier_free(s->carrier);
+  batten_free(s->ctx, s->points);
+  batten_free(s->ctx, s);
+}
+
+unsigned batten_solid_dimension(const batten_solid *s) { return s->n; }
+batten_spline *batten_solid_spline(const batten_solid *s) { return s->spline; }
+batten_carrier *batten_solid_carrier(const batten_solid *s) { return s->carrier; }
+int batten_solid_sign(const batten_solid *s) { return s->sign; }
+
+void batten_solid_box(const batten_solid *s, double *lower, double *upper) {
+  memcpy(lower, s->lower, s->n * sizeof *lower);
+  memcpy(upper, s->upper, s->n * sizeof *upper);
+}
+
+const double *batten_solid_points(const batten_solid *s, size_t *count) {
+  *count = s->count;
+  return s->points;
+}
