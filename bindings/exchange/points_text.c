@@ -196,10 +196,9 @@ static batten_status take_line(table *t, const char *line) {
     return BATTEN_OK;
   }
   if (empty) return BATTEN_OK;
-  if (t->columns == 0 && is_header(line, length)) {
+  bool has_header = t->named && !t->names_in_comment; /* then text may stand in the other columns */
+  if (t->columns == 0 && !has_header && is_header(line, length)) {
     char quote[BX_QUOTE_SIZE];
-    if (t->named && !t->names_in_comment)
-      return bx_fail_line(t->r, "a second header line '%s'; one is known", bx_quote(line, length, quote));
     if (!take_names(t, line, length))
       return bx_fail_line(t->r, "the header '%s' names no columns x and y; rename them, or remove the line",
                           bx_quote(line, length, quote));
