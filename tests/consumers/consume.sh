@@ -50,14 +50,17 @@ with_pkg_config() {
 with_cmake() {
   command -v cmake >/dev/null || { echo "cmake is not installed"; exit 77; }
   install_batten "$1"
-  CC=$CC cmake -G Ninja -S "$program" -B "$scratch/build" -DCMAKE_PREFIX_PATH="$prefix" -DCMAKE_C_FLAGS="$flags" >"$scratch/log" ||
+  # On Debian cmake does not look below lib64, which is what meson takes for libdir where dpkg-dev is missing.
+  find=-DCMAKE_PREFIX_PATH=$prefix
+  [ "$LIBDIR" != lib64 ] || find=-Dbatten_DIR=$libdir/cmake/batten
+  CC=$CC cmake -G Ninja -S "$program" -B "$scratch/build" "$find" -DCMAKE_C_FLAGS="$flags" >"$scratch/log" ||
     { cat "$scratch/log"; exit 1; }
   cmake --build "$scratch/build" >"$scratch/log" 2>&1 || { cat "$scratch/log"; exit 1; }
   for part in batten batten-exchange; do
     [ ! -x "$scratch/build/$part" ] || try "$1" "$scratch/build/$part"
   done
   # A version that does not fit has to be refused.
-  if CC=$CC cmake -G Ninja -S "$program" -B "$scratch/other" -DCMAKE_PREFIX_PATH="$prefix" -DWANTED=7.0 >"$scratch/log" 2>&1; then
+  if CC=$CC cmake -G Ninja -S "$program" -B "$scratch/other" "$find" -DWANTED=7.0 >"$scratch/log" 2>&1; then
     echo "find_package took version $VERSION for 7.0"
     exit 1
   fi
