@@ -74,10 +74,13 @@ typedef struct batten_picture_options {
   size_t struct_size;
   unsigned width, height;  /* pixels, 16 .. 8192. Default 1200 x 900. */
   double azimuth_deg;      /* camera around the z axis from +x. Default 35. */
-  double elevation_deg;    /* camera above the xy plane. Default 22. */
+  double elevation_deg;    /* camera above the xy plane, -90 .. 90. Default 22. */
+  unsigned up_axis;        /* 0, 1, 2: x, y or z points upwards; the camera's angles turn with it. Default 2. */
   size_t point_count;      /* data points drawn as dots, 0 = none */
   const double *points;    /* [point_count][3], for outlines [point_count][2] */
-  const double *colors;    /* mesh: [V] scalar shown by colour, NULL = plain */
+  const double *colors;    /* mesh: [V] scalar shown by colour, NULL = plain; grey where not finite */
+  double color_lower, color_upper; /* their range; equal = from the 1st to the 99th percentile. Default 0, 0. */
+  const char *color_label; /* over the colour bar; NULL = none; ASCII */
   const char *title;       /* NULL = none; ASCII */
 } batten_picture_options;
 BATTEN_API batten_picture_options batten_picture_options_default(void);

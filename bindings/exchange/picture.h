@@ -1,0 +1,100 @@
+/* What the pictures share: an image in linear light, a coverage mask to draw into it, lettering, colours.
+ *
+ * Everything is drawn through the mask: shapes leave their coverage (0 .. 1 per pixel) there, then one call blends
+ * a colour through it. So overlapping strokes of one colour do not darken each other, and antialiasing has one home.
+ * Pixel (x, y) covers [x, x+1) x [y, y+1), y downwards. */
+#ifndef BATTEN_EXCHANGE_PICTURE_H
+#define BATTEN_EXCHANGE_PICTURE_H
+
+#include <batten/exchange.h>
+#include <stdbool.h>
+
+enum { PICTURE_SIDE_MIN = 16, PICTURE_SIDE_MAX = 8192, PICTURE_TICK_SIZE = 48 };
+
+typedef struct picture_color {
+  float r, g, b; /* linear light, 0 .. 1 */
+} picture_color;
+
+typedef struct picture_image {
+  size_t width, height;
+  float *rgb;                                    /* [height][width][3] linear light */
+  float *mask;                                   /* [height][width] coverage; zero between drawings */
+  size_t dirty_x0, dirty_y0, dirty_x1, dirty_y1; /* pixels of the mask that may be non-zero */
+} picture_image;
+
+/* ---- image ---- */
+batten_status picture_image_new(batten_context *ctx, size_t width, size_t height, picture_image *out);
+void picture_image_free(batten_context *ctx, picture_image *image);
+void picture_mask_capsule(picture_image *image, double x0, double y0, double x1, double y1, double radius);
+/* Adds the signed area under a closed polygon, then picture_mask_fold makes coverage of the sum of all loops. */
+void picture_mask_polygon(picture_image *image, size_t count, const double *xy);
+void picture_mask_fold(picture_image *image);
+void picture_mask_rectangle(picture_image *image, double x0, double y0, double x1, double y1);
+/* Blends color * opacity through the mask and clears it. */
+void picture_blend(picture_image *image, picture_color color, double opacity);
+/* PNG, 8 bit sRGB. */
+batten_status picture_write_png(batten_context *ctx, const picture_image *image, const char *path);
+
+/* ---- lettering ---- */
+/* Into the mask: left end of the base line at (x, y), height of capitals in pixels. ASCII; others as '?'. */
+void picture_mask_text(picture_image *image, double x, double y, double height, double weight, const char *text);
+double picture_text_width(double height, const char *text);
+
+/* ---- colours and numbers ---- */
+picture_color picture_srgb(unsigned hex); /* 0xrrggbb as linear light */
+picture_color picture_colormap(double t); /* t in [0, 1]; NaN gives grey */
+/* Ticks of [lower, upper]: at (first + i) * mantissa * 10^exponent, i < count, about `wanted` of them. */
+typedef struct picture_ticks {
+  long long first;
+  int mantissa, exponent;
+  size_t count;
+} picture_ticks;
+picture_ticks picture_ticks_choose(double lower, double upper, unsigned wanted);
+double picture_tick_value(const picture_ticks *ticks, size_t i);
+/* The shortest exact text of a tick, independent of the locale; text [PICTURE_TICK_SIZE]. */
+void picture_tick_text(const picture_ticks *ticks, size_t i, char text[PICTURE_TICK_SIZE]);
+
+bool picture_has_extension(const char *path, const char *extension); /* ".png", any case */
+/* Options as given or default, checked: ranges, finite numbers. */
+batten_status picture_check_options(batten_context *ctx, const batten_picture_options *opt, unsigned dimension,
+                                    batten_picture_options *out);
+
+/* ---- the mesh picture's parts ---- */
+typedef struct picture_camera {
+  double right[3], up[3], back[3]; /* back points from the scene to the camera */
+  double distance;                 /* of the camera from the scene's origin along back */
+  double offset[2];                /* of its axis, along right and up */
+  double focal;                    /* pixels */
+  double center[2];                /* pixel where the axis hits the image */
+} picture_camera;
+
+/* The mesh in the unit ball about its centre, z upwards, and its dots. */
+typedef struct picture_scene {
+  size_t vertex_count, triangle_count, dot_count;
+  const uint32_t *triangles;
+  float *vertices; /* [V][3] */
+  float *normals;  /* [V][3] */
+  float *tones;    /* [V] in [0, 1] or NaN; NULL without colours */
+  float *dots;     /* [dot_count][3] */
+  float dot_radius;
+  float ground; /* height of the ground plane */
+} picture_scene;
+
+/* What is seen in each of width * height * samples^2 points of the image. */
+typedef struct picture_buffer {
+  size_t width, height; /* of the samples' grid */
+  unsigned samples;     /* per pixel and direction */
+  float *nearness;      /* 1 / distance along the camera's axis, 0 = background */
+  uint32_t *item;       /* triangle, or triangle_count + dot */
+  float *screen;        /* [V][3]: x, y in samples, nearness */
+} picture_buffer;
+
+batten_status picture_rasterize(batten_context *ctx, const picture_scene *scene, const picture_camera *camera,
+                                picture_buffer *buffer);
+/* Depth of a scene seen from infinity along a direction: map [size][size] over the square [-1, 1]^2 of (u, v), holds
+ * the largest coordinate along d, -2 where there is nothing. */
+void picture_depth_map(const picture_scene *scene, const float u[3], const float v[3], const float d[3], size_t size,
+                       float *map);
+batten_status picture_shade(batten_context *ctx, const picture_scene *scene, const picture_camera *camera,
+                            const picture_buffer *buffer, picture_image *image);
+#endif

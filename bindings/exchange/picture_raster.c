@@ -1,0 +1,150 @@
+/* Visibility: which triangle or dot is seen in each sample of the picture, and depth maps for the lights.
+ *
+ * Both walk the pixels of a triangle's bounding box with three edge functions; the nearer wins. The picture is cut
+ * into bands of rows, one task each; each band looks at all triangles in order, so ties go the same way for any
+ * number of threads. 1/distance is linear on the screen, distance is not: the buffer keeps 1/distance. */
+#include "picture.h"
+
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+enum { BAND_ROWS = 64 };
+
+typedef struct raster_job {
+  const picture_scene *scene;
+  const picture_camera *camera;
+  picture_buffer *buffer;
+} raster_job;
+
+/* ---- projection ---------------------------------------------------------------------------------- */
+
+static double dot3(const double a[3], const float b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+static void project(const picture_camera *c, unsigned samples, const float point[3], float screen[3]) {
+  double distance = c->distance - dot3(c->back, point), scale = c->focal / distance * samples;
+  screen[0] = (float)(c->center[0] * samples + scale * (dot3(c->right, point) - c->offset[0]));
+  screen[1] = (float)(c->center[1] * samples - scale * (dot3(c->up, point) - c->offset[1]));
+  screen[2] = (float)(1 / distance);
+}
+
+enum { PROJECT_CHUNK = 8192 };
+
+static void project_chunk(void *arg, size_t chunk) {
+  raster_job *job = arg;
+  size_t end = (chunk + 1) * PROJECT_CHUNK;
+  if (end > job->scene->vertex_count) end = job->scene->vertex_count;
+  for (size_t v = chunk * PROJECT_CHUNK; v < end; v++)
+    project(job->camera, job->buffer->samples, job->scene->vertices + 3 * v, job->buffer->screen + 3 * v);
+}
+
+/* ---- triangles ----------------------------------------------------------------------------------- */
+
+static double edge(const float a[3], const float b[3], double x, double y) {
+  return ((double)b[0] - a[0]) * (y - a[1]) - ((double)b[1] - a[1]) * (x - a[0]);
+}
+
+/* First and one-past-last cell centre (i + 0.5) of the grid within [lower, upper]. */
+static void cells_within(double lower, double upper, size_t limit_first, size_t limit_end, size_t *first,
+                         size_t *end) {
+  double a = ceil(lower - 0.5), b = floor(upper - 0.5) + 1;
+  *first = a <= (double)limit_first ? limit_first : a >= (double)limit_end ? limit_end : (size_t)a;
+  *end = b <= (double)limit_first ? limit_first : b >= (double)limit_end ? limit_end : (size_t)b;
+}
+
+/* The grid that triangles are drawn to: screen of the camera or of a light. */
+typedef struct target {
+  size_t width, row_first, row_end;
+  float *depth;   /* larger is nearer */
+  uint32_t *item; /* NULL: depth only */
+} target;
+
+static void draw_triangle(const target *t, const float *a, const float *b, const float *c, uint32_t item) {
+  float low = fminf(a[1], fminf(b[1], c[1])), high = fmaxf(a[1], fmaxf(b[1], c[1]));
+  if (high < (float)t->row_first || low > (float)t->row_end) return;
+  double area = edge(a, b, c[0], c[1]);
+  if (area == 0 || !isfinite(area)) return;
+  size_t x0, x1, y0, y1;
+  cells_within(fminf(a[0], fminf(b[0], c[0])), fmaxf(a[0], fmaxf(b[0], c[0])), 0, t->width, &x0, &x1);
+  cells_within(low, high, t->row_first, t->row_end, &y0, &y1);
+  if (x0 >= x1 || y0 >= y1) return;
+  double sign = area < 0 ? -1 : 1, scale = sign / area;
+  /* Edge functions, positive inside, and their steps along the row. */
+  double step_a = -sign * ((double)c[1] - b[1]), step_b = -sign * ((double)a[1] - c[1]);
+  double step_c = -sign * ((double)b[1] - a[1]);
+  for (size_t y = y0; y < y1; y++) {
+    double px = (double)x0 + 0.5, py = (double)y + 0.5;
+    double ea = sign * edge(b, c, px, py), eb = sign * edge(c, a, px, py), ec = sign * edge(a, b, px, py);
+    float *depth = t->depth + y * t->width;
+    for (size_t x = x0; x < x1; x++, ea += step_a, eb += step_b, ec += step_c) {
+      if (ea < 0 || eb < 0 || ec < 0) continue;
+      float z = (float)((ea * a[2] + eb * b[2] + ec * c[2]) * scale);
+      if (z <= depth[x]) continue;
+      depth[x] = z;
+      if (t->item) t->item[y * t->width + x] = item;
+    }
+  }
+}
+
+/* ---- dots: balls, seen as discs ------------------------------------------------------------------ */
+
+static void draw_dot(const raster_job *job, const target *t, size_t index) {
+  const picture_scene *s = job->scene;
+  float p[3];
+  project(job->camera, job->buffer->samples, s->dots + 3 * index, p);
+  double radius = s->dot_radius * job->camera->focal * p[2] * job->buffer->samples;
+  size_t x0, x1, y0, y1;
+  cells_within(p[0] - radius, p[0] + radius, 0, t->width, &x0, &x1);
+  cells_within(p[1] - radius, p[1] + radius, t->row_first, t->row_end, &y0, &y1);
+  for (size_t y = y0; y < y1; y++)
+    for (size_t x = x0; x < x1; x++) {
+      double dx = ((double)x + 0.5 - p[0]) / radius, dy = ((double)y + 0.5 - p[1]) / radius, r2 = dx * dx + dy * dy;
+      if (r2 > 1) continue;
+      float z = (float)(1 / (1.0 / p[2] - s->dot_radius * sqrt(1 - r2)));
+      size_t at = y * t->width + x;
+      if (z <= t->depth[at]) continue;
+      t->depth[at] = z;
+      t->item[at] = (uint32_t)(s->triangle_count + index);
+    }
+}
+
+static void draw_band(void *arg, size_t band) {
+  raster_job *job = arg;
+  const picture_scene *s = job->scene;
+  picture_buffer *b = job->buffer;
+  target t = {.width = b->width, .row_first = band * BAND_ROWS, .depth = b->nearness, .item = b->item};
+  t.row_end = t.row_first + BAND_ROWS < b->height ? t.row_first + BAND_ROWS : b->height;
+  memset(b->nearness + t.row_first * b->width, 0, (t.row_end - t.row_first) * b->width * sizeof *b->nearness);
+  for (size_t f = 0; f < s->triangle_count; f++) {
+    const uint32_t *v = s->triangles + 3 * f;
+    draw_triangle(&t, b->screen + 3 * (size_t)v[0], b->screen + 3 * (size_t)v[1], b->screen + 3 * (size_t)v[2],
+                  (uint32_t)f);
+  }
+  for (size_t i = 0; i < s->dot_count; i++) draw_dot(job, &t, i);
+}
+
+batten_status picture_rasterize(batten_context *ctx, const picture_scene *scene, const picture_camera *camera,
+                                picture_buffer *buffer) {
+  raster_job job = {scene, camera, buffer};
+  batten_parallel(ctx, (scene->vertex_count + PROJECT_CHUNK - 1) / PROJECT_CHUNK, project_chunk, &job);
+  batten_status st = batten_progress(ctx, "picture", 0.05);
+  if (st < 0) return st;
+  batten_parallel(ctx, (buffer->height + BAND_ROWS - 1) / BAND_ROWS, draw_band, &job);
+  return batten_progress(ctx, "picture", 0.2);
+}
+
+void picture_depth_map(const picture_scene *s, const float u[3], const float v[3], const float d[3], size_t size,
+                       float *map) {
+  for (size_t i = 0; i < size * size; i++) map[i] = -2;
+  target t = {.width = size, .row_end = size, .depth = map};
+  for (size_t f = 0; f < s->triangle_count; f++) {
+    float corner[3][3];
+    for (size_t k = 0; k < 3; k++) {
+      const float *p = s->vertices + 3 * (size_t)s->triangles[3 * f + k];
+      corner[k][0] = (u[0] * p[0] + u[1] * p[1] + u[2] * p[2] + 1) * 0.5f * (float)size;
+      corner[k][1] = (v[0] * p[0] + v[1] * p[1] + v[2] * p[2] + 1) * 0.5f * (float)size;
+      corner[k][2] = d[0] * p[0] + d[1] * p[1] + d[2] * p[2];
+    }
+    draw_triangle(&t, corner[0], corner[1], corner[2], 0);
+  }
+}

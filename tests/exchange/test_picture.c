@@ -1,0 +1,260 @@
+/* Pictures: the parts by hand (coverage, ticks, colours, lettering), then whole pictures read back. */
+#include "tap.h"
+
+#include <batten/exchange.h>
+#include <png.h>
+#include <unistd.h>
+
+#include "picture.h"
+
+static char directory[] = "/tmp/batten-picture-XXXXXX";
+static char path_a[64], path_b[64];
+
+typedef struct pixels {
+  unsigned width, height;
+  unsigned char *rgb;
+} pixels;
+
+static pixels read_png(const char *path) {
+  png_image image = {.version = PNG_IMAGE_VERSION};
+  pixels p = {0};
+  if (!png_image_begin_read_from_file(&image, path)) return p;
+  image.format = PNG_FORMAT_RGB;
+  p.rgb = malloc(PNG_IMAGE_SIZE(image));
+  if (!p.rgb || !png_image_finish_read(&image, NULL, p.rgb, 0, NULL)) return p;
+  p.width = image.width;
+  p.height = image.height;
+  return p;
+}
+
+static bool same_bytes(const char *a, const char *b) {
+  FILE *f = fopen(a, "rb"), *g = fopen(b, "rb");
+  bool same = f && g;
+  for (int c = 0; same && c != EOF;) same = (c = fgetc(f)) == fgetc(g);
+  if (f) fclose(f);
+  if (g) fclose(g);
+  return same;
+}
+
+/* Ball of radius 2 about (3, 4, 5), by latitude and longitude. */
+static batten_mesh *make_ball(batten_context *ctx, uint32_t M) {
+  enum { LARGEST = 24 };
+  static double v[2 + (LARGEST - 1) * 2 * LARGEST][3];
+  static uint32_t t[4 * LARGEST * (LARGEST - 1)][3];
+  const uint32_t N = 2 * M;
+  size_t V = 0, F = 0;
+  const double pi = 3.14159265358979323846;
+  for (uint32_t i = 1; i < M; i++)
+    for (uint32_t j = 0; j < N; j++, V++) {
+      double a = pi * i / M, b = 2 * pi * j / N;
+      v[V][0] = 3 + 2 * sin(a) * cos(b), v[V][1] = 4 + 2 * sin(a) * sin(b), v[V][2] = 5 + 2 * cos(a);
+    }
+  v[V][0] = v[V + 1][0] = 3, v[V][1] = v[V + 1][1] = 4, v[V][2] = 7, v[V + 1][2] = 3;
+  for (uint32_t j = 0; j < N; j++) {
+    uint32_t k = (j + 1) % N, last = (M - 2) * N;
+    t[F][0] = (uint32_t)V, t[F][1] = j, t[F++][2] = k;
+    t[F][0] = (uint32_t)V + 1, t[F][1] = last + k, t[F++][2] = last + j;
+    for (uint32_t i = 0; i + 2 < M; i++) {
+      uint32_t a = i * N + j, b = i * N + k;
+      t[F][0] = a, t[F][1] = a + N, t[F++][2] = b;
+      t[F][0] = b, t[F][1] = a + N, t[F++][2] = b + N;
+    }
+  }
+  batten_mesh *mesh = NULL;
+  return batten_mesh_create(ctx, V + 2, &v[0][0], F, &t[0][0], &mesh) == BATTEN_OK ? mesh : NULL;
+}
+
+static double total(const picture_image *im) {
+  double sum = 0;
+  for (size_t i = 0; i < im->width * im->height; i++) sum += (double)im->mask[i];
+  return sum;
+}
+
+static void test_mask(batten_context *ctx) {
+  picture_image im;
+  T_OK(picture_image_new(ctx, 20, 10, &im), ctx);
+  /* A triangle of area 12, one corner on a half pixel; and its hole, a square of area 1 turned the other way. */
+  const double triangle[] = {2.5, 1, 10.5, 1, 2.5, 4}, hole[] = {3.5, 1.5, 3.5, 2.5, 4.5, 2.5, 4.5, 1.5};
+  picture_mask_polygon(&im, 3, triangle);
+  picture_mask_polygon(&im, 4, hole);
+  picture_mask_fold(&im);
+  double sum = total(&im);
+  T_RATIO(fabs(sum - 11), 1e-5, "a polygon covers its area, less its hole");
+  T_CHECK(im.mask[1 * 20 + 2] == 0.5f, "its edge pixel is half covered: %g", (double)im.mask[1 * 20 + 2]);
+  picture_blend(&im, (picture_color){0, 0, 0}, 1);
+  T_CHECK(fabsf(im.rgb[3 * (1 * 20 + 2)] - 0.5f) < 1e-6f, "and half blended");
+  sum = total(&im);
+  T_CHECK(sum == 0, "a blend leaves the mask empty");
+  const double beyond[] = {-30, -20, 60, -20, 60, 40, -30, 40};
+  picture_mask_polygon(&im, 4, beyond);
+  picture_mask_fold(&im);
+  sum = total(&im);
+  T_CHECK(sum == 200, "a polygon around the image covers it: %g of 200", sum);
+  picture_blend(&im, (picture_color){0, 0, 0}, 1);
+  picture_mask_capsule(&im, 5, 5, 13, 5, 2);
+  sum = total(&im);
+  T_RATIO(fabs(sum / (8 * 4 + 3.14159265 * 4) - 1), 0.02, "a capsule covers its area");
+  picture_blend(&im, (picture_color){0, 0, 0}, 1);
+  picture_mask_text(&im, -5, 300, 4e3, 1, "far out");
+  picture_blend(&im, (picture_color){0, 0, 0}, 1);
+  T_RATIO(fabs(picture_text_width(8, "II") - 2 * picture_text_width(8, "I") - 2), 1e-12,
+          "letters stand 2 units apart");
+  T_CHECK(picture_text_width(8, "\xc3") == picture_text_width(8, "?"), "what has no letter is a question mark");
+  picture_image_free(ctx, &im);
+}
+
+static void check_ticks(double lower, double upper, unsigned wanted, const char *expected) {
+  char text[PICTURE_TICK_SIZE], all[512] = "";
+  picture_ticks t = picture_ticks_choose(lower, upper, wanted);
+  bool exact = true;
+  for (size_t i = 0; i < t.count && i < 20; i++) {
+    picture_tick_text(&t, i, text);
+    exact &= strtod(text, NULL) == picture_tick_value(&t, i);
+    snprintf(all + strlen(all), sizeof all - strlen(all), "%s%s", i ? " " : "", text);
+  }
+  T_CHECK(exact && strcmp(all, expected) == 0, "ticks of [%g, %g]: %s", lower, upper, all);
+}
+
+static void test_numbers(void) {
+  check_ticks(0, 1, 5, "0 0.2 0.4 0.6 0.8 1.0");
+  check_ticks(-0.31, 0.29, 6, "-0.3 -0.2 -0.1 0 0.1 0.2");
+  check_ticks(1234, 5678, 4, "2000 3000 4000 5000");
+  check_ticks(-3e9, 3e9, 3, "-2e9 0 2e9");
+  check_ticks(1e-12, 5e-12, 4, "1e-12 2e-12 3e-12 4e-12 5e-12");
+  check_ticks(2, 2, 5, "");
+  check_ticks(7e6, 7e6 + 2, 4, "7000000.0 7000000.5 7000001.0 7000001.5 7000002.0");
+  double last = -1;
+  bool rises = true;
+  for (int i = 0; i <= 100; i++) {
+    picture_color c = picture_colormap(i / 100.0);
+    double y = 0.2126 * (double)c.r + 0.7152 * (double)c.g + 0.0722 * (double)c.b;
+    rises &= y > last;
+    last = y;
+  }
+  T_CHECK(rises, "the colour map gets lighter all along, to %.2f", last);
+  picture_color grey = picture_colormap(NAN);
+  T_CHECK(grey.r == grey.g && grey.g == grey.b, "not a number is grey");
+}
+
+/* The ball coloured by one value: its pixels are known by their colour, so its disc can be measured. */
+static void test_ball(batten_context *ctx, const batten_mesh *ball) {
+  size_t V = batten_mesh_vertex_count(ball);
+  double *colors = malloc(V * sizeof *colors);
+  for (size_t i = 0; i < V; i++) colors[i] = 0.25;
+  batten_picture_options o = batten_picture_options_default();
+  o.width = 320, o.height = 240, o.colors = colors, o.color_lower = 0, o.color_upper = 1;
+  T_OK(batten_picture_mesh(ctx, ball, &o, path_a), ctx);
+  pixels p = read_png(path_a);
+  T_CHECK(p.width == 320 && p.height == 240, "the file is a PNG of 320 x 240");
+  size_t x0 = 320, x1 = 0, y0 = 240, y1 = 0, count = 0;
+  for (size_t y = 0; y < p.height; y++)
+    for (size_t x = 0; x < 240; x++) { /* left of the colour bar */
+      const unsigned char *c = p.rgb + 3 * (y * 320 + x);
+      if (c[2] < c[0] + 25) continue;
+      count++;
+      if (x < x0) x0 = x;
+      if (x > x1) x1 = x;
+      if (y < y0) y0 = y;
+      if (y > y1) y1 = y;
+    }
+  double wide = (double)(x1 + 1 - x0), high = (double)(y1 + 1 - y0), margin = 0.055 * 240;
+  T_RATIO(fabs(high - (240 - 2.3 * margin)), 2, "a ball fills the frame: %g pixels high", high);
+  T_RATIO(fabs(wide - high), 2, "and is round: %g x %g", wide, high);
+  T_RATIO(fabs((double)count / (3.14159265 / 4 * wide * high) - 1), 0.02, "and full");
+  const unsigned char *light = p.rgb + 3 * (70 * 320 + 105), *dark = p.rgb + 3 * (175 * 320 + 165);
+  T_CHECK(light[1] > dark[1] + 20, "light comes from above on the left: %d, below on the right %d", light[1],
+          dark[1]);
+  const unsigned char *ground = p.rgb + 3 * (228 * 320 + 150), *open = p.rgb + 3 * (228 * 320 + 10);
+  T_CHECK(ground[1] + 15 < open[1], "and the ball's shadow lies on the ground: %d beside %d", ground[1], open[1]);
+  free(p.rgb);
+  free(colors);
+}
+
+static batten_status draw_small(batten_context *ctx, void *arg) {
+  (void)arg;
+  batten_mesh *ball = make_ball(ctx, 5);
+  if (!ball) return BATTEN_E_NOMEM;
+  batten_picture_options o = batten_picture_options_default();
+  o.width = 40, o.height = 30, o.title = "A & b", o.color_label = "z";
+  o.points = batten_mesh_vertices(ball);
+  o.point_count = 3;
+  o.colors = batten_mesh_vertices(ball);
+  batten_status st = batten_picture_mesh(ctx, ball, &o, path_b);
+  batten_mesh_free(ball);
+  return st;
+}
+
+static void test_bad(batten_context *ctx, const batten_mesh *ball) {
+  const batten_picture_options good = batten_picture_options_default();
+  batten_picture_options o = good;
+  o.width = 8;
+  T_STATUS(batten_picture_mesh(ctx, ball, &o, path_a), BATTEN_E_INVALID, ctx, "8 x 900; each must be 16 .. 8192");
+  o = good, o.height = 8193;
+  T_STATUS(batten_picture_mesh(ctx, ball, &o, path_a), BATTEN_E_INVALID, ctx, "1200 x 8193");
+  o = good, o.struct_size = 0;
+  T_STATUS(batten_picture_mesh(ctx, ball, &o, path_a), BATTEN_E_INVALID, ctx,
+           "batten_picture_options.struct_size: 0");
+  o = good, o.elevation_deg = 91;
+  T_STATUS(batten_picture_mesh(ctx, ball, &o, path_a), BATTEN_E_INVALID, ctx, "elevation within -90 .. 90");
+  o = good, o.azimuth_deg = NAN;
+  T_STATUS(batten_picture_mesh(ctx, ball, &o, path_a), BATTEN_E_INVALID, ctx, "must be finite");
+  o = good, o.up_axis = 3;
+  T_STATUS(batten_picture_mesh(ctx, ball, &o, path_a), BATTEN_E_INVALID, ctx, "opt.up_axis: 3");
+  o = good, o.point_count = 1;
+  T_STATUS(batten_picture_mesh(ctx, ball, &o, path_a), BATTEN_E_INVALID, ctx, "opt.points: NULL");
+  const double bad[] = {0, 0, 0, 1, INFINITY, 1};
+  o = good, o.point_count = 2, o.points = bad;
+  T_STATUS(batten_picture_mesh(ctx, ball, &o, path_a), BATTEN_E_INVALID, ctx, "opt.points[1]: coordinate 1");
+  o = good, o.color_lower = 1;
+  T_STATUS(batten_picture_mesh(ctx, ball, &o, path_a), BATTEN_E_INVALID, ctx, "in order");
+  T_STATUS(batten_picture_mesh(ctx, ball, NULL, "ball.jpg"), BATTEN_E_INVALID, ctx, "use .png");
+  T_STATUS(batten_picture_mesh(ctx, ball, NULL, "/nonexistent/ball.png"), BATTEN_E_IO, ctx, "/nonexistent/ball.png");
+  batten_mesh *empty = NULL;
+  T_OK(batten_mesh_create(ctx, 0, NULL, 0, NULL, &empty), ctx);
+  T_STATUS(batten_picture_mesh(ctx, empty, NULL, path_a), BATTEN_E_INVALID, ctx, "no triangles");
+  batten_mesh_free(empty);
+}
+
+/* Odd meshes must still give a picture: one triangle seen from behind and edge on, far from the origin. */
+static void test_odd(batten_context *ctx) {
+  const double v[][3] = {{7e6, 7e6, 1}, {7e6 + 1, 7e6, 1}, {7e6, 7e6 + 1, 1}, {7e6, 7e6, 1}};
+  const uint32_t one[] = {0, 1, 2};
+  const double elevations[] = {-90, -40, 0, 90};
+  batten_mesh *mesh = NULL;
+  T_OK(batten_mesh_create(ctx, 4, &v[0][0], 1, one, &mesh), ctx);
+  batten_picture_options o = batten_picture_options_default();
+  o.width = 48, o.height = 32;
+  for (int i = 0; i < 4; i++) {
+    o.elevation_deg = elevations[i];
+    T_OK(batten_picture_mesh(ctx, mesh, &o, path_a), ctx);
+  }
+  batten_mesh_free(mesh);
+}
+
+int main(void) {
+  if (!mkdtemp(directory)) return 1;
+  snprintf(path_a, sizeof path_a, "%s/a.png", directory);
+  snprintf(path_b, sizeof path_b, "%s/b.png", directory);
+  batten_context *ctx = t_context(NULL, NULL, 1);
+  batten_mesh *ball = make_ball(ctx, 24);
+  test_mask(ctx);
+  test_numbers();
+  test_ball(ctx, ball);
+  test_odd(ctx);
+  test_bad(ctx, ball);
+  batten_mesh_free(ball);
+  batten_context *three = t_context(NULL, NULL, 3);
+  T_OK(draw_small(ctx, NULL), ctx);
+  rename(path_b, path_a);
+  T_OK(draw_small(three, NULL), three);
+  T_CHECK(same_bytes(path_a, path_b), "one thread and three write the same bytes");
+  t_fail_every_allocation("batten_picture_mesh", draw_small, NULL);
+  t_cancel_every_progress("batten_picture_mesh", draw_small, NULL);
+  T_CHECK(same_bytes(path_a, path_b), "and the file is whole after it");
+  batten_context_free(three);
+  batten_context_free(ctx);
+  unlink(path_a);
+  unlink(path_b);
+  T_CHECK(rmdir(directory) == 0, "nothing else is left in the directory");
+  return t_done();
+}
