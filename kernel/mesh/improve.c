@@ -1,0 +1,328 @@
+/* Even triangles on f = 0 (Botsch, Kobbelt 2004, "A remeshing approach to multiresolution modeling"): a round splits
+ * long edges, collapses short ones, flips towards Delaunay, and moves vertices towards the mean of their neighbours
+ * in the tangent plane, then back to the surface by one Newton step. Field values come in one batch a round.
+ *
+ * No step may turn a triangle over: a change is made only when the new triangles face as the old ones did and as the
+ * gradients at their corners ask for. Vertices on the box stay on their faces of it, corners on an edge of the box
+ * stay on that edge. */
+#include "improve.h"
+
+#include "base/checked.h"
+#include "vec.h"
+
+#include <string.h>
+
+static const double LONG_EDGE = 4.0 / 3, SHORT_EDGE = 4.0 / 5; /* the paper's bounds: a split makes no short edge */
+static const double SMOOTHING = 0.7;                           /* of the way to the neighbours' mean */
+static const double STEP_MAX = 0.3;                            /* Newton step, in edges */
+static const double TURN_MIN = 0.5;    /* cosine between a triangle's normals before and after a change */
+static const double FACE_MIN = 0.2;    /* cosine between its normal and its corners' gradients */
+static const double QUALITY_MIN = 0.3; /* changes make no triangle worse than this, unless it was worse before */
+
+enum { FLIP_SWEEPS = 4, VALENCE_MAX = 12 };
+
+typedef struct improver {
+  batten_surface *s;
+  batten_sampler *sampler;
+  double edge;
+  double *target, *values, *gradients; /* [V][3], [V], [V][3] */
+  size_t room;                         /* vertices that they hold */
+} improver;
+
+static double *point(const batten_surface *s, uint32_t v) { return s->points + 3 * (size_t)v; }
+static double *normal(const batten_surface *s, uint32_t v) { return s->normals + 3 * (size_t)v; }
+
+/* ---- what a change does to a triangle ----------------------------------------------------------- */
+
+/* 1 for the equilateral triangle, 0 without area: 4 sqrt(3) area / sum of squared sides. */
+static double quality(const double *a, const double *b, const double *c, double twice_area) {
+  double ab[3], bc[3], ca[3];
+  vec_sub(b, a, ab);
+  vec_sub(c, b, bc);
+  vec_sub(a, c, ca);
+  double squares = vec_dot(ab, ab) + vec_dot(bc, bc) + vec_dot(ca, ca);
+  return squares > 0 ? 3.4641016151377546 * twice_area / squares : 0;
+}
+
+typedef struct facet {
+  double n[3];    /* unit normal, 0 without area */
+  double quality;
+  double facing;  /* cosine with the sum of the corners' normals */
+} facet;
+
+static facet facet_of(const double *a, const double *b, const double *c, const double *na, const double *nb,
+                      const double *nc) {
+  facet f;
+  double sum[3];
+  vec_triangle_normal(a, b, c, f.n);
+  f.quality = quality(a, b, c, vec_norm(f.n));
+  vec_normalize(f.n);
+  for (int k = 0; k < 3; k++) sum[k] = na[k] + nb[k] + nc[k];
+  vec_normalize(sum);
+  f.facing = vec_dot(sum, f.n);
+  return f;
+}
+
+/* May the triangle `before` become `after`? */
+static bool may_become(const facet *before, const facet *after) {
+  bool flat = before->quality < 0.02; /* its normal says nothing */
+  if (!flat && !(vec_dot(before->n, after->n) > TURN_MIN)) return false;
+  if (!(after->facing > FACE_MIN) && !(after->facing > before->facing)) return false;
+  return after->quality > QUALITY_MIN || after->quality > before->quality;
+}
+
+/* ---- split and collapse ------------------------------------------------------------------------- */
+
+static double edge_length(const batten_surface *s, uint32_t h) {
+  return vec_distance(point(s, s->origin[h]), point(s, s->origin[mesh_next(h)]));
+}
+
+static batten_status split_long(improver *im) {
+  batten_surface *s = im->s;
+  for (uint32_t h = 0; h < 3 * s->triangle_count; h++) { /* halves come later in the same loop */
+    if (s->origin[h] == MESH_NONE || !(edge_length(s, h) > LONG_EDGE * im->edge)) continue;
+    const double *a = point(s, s->origin[h]), *b = point(s, s->origin[mesh_next(h)]);
+    double middle[3];
+    for (int k = 0; k < 3; k++) middle[k] = 0.5 * a[k] + 0.5 * b[k];
+    if (batten_surface_split(s, h, middle) == MESH_NONE) return BATTEN_E_NOMEM;
+  }
+  return BATTEN_OK;
+}
+
+/* May the triangles of v, but those that also have `other`, have v at x with the normal n? */
+static bool ring_allows(const improver *im, uint32_t v, uint32_t other, const double *x, const double *n) {
+  const batten_surface *s = im->s;
+  uint32_t ring[SURFACE_RING_MAX];
+  size_t count = batten_surface_ring(s, v, ring);
+  for (size_t i = 0; i < count; i++) {
+    uint32_t p = s->origin[mesh_next(ring[i])], q = s->origin[mesh_previous(ring[i])];
+    if (p == other || q == other) continue;
+    if (other != MESH_NONE && (vec_distance(x, point(s, p)) > LONG_EDGE * im->edge ||
+                               vec_distance(x, point(s, q)) > LONG_EDGE * im->edge))
+      return false;
+    facet before = facet_of(point(s, v), point(s, p), point(s, q), normal(s, v), normal(s, p), normal(s, q));
+    facet after = facet_of(x, point(s, p), point(s, q), n, normal(s, p), normal(s, q));
+    if (!may_become(&before, &after)) return false;
+  }
+  return count > 0;
+}
+
+/* Draws the origin of h into its end when that is allowed; to the middle where both may move. */
+static bool try_collapse(improver *im, uint32_t h) {
+  batten_surface *s = im->s;
+  uint32_t a = s->origin[h], b = s->origin[mesh_next(h)];
+  if (s->faces[a] & ~s->faces[b]) return false; /* would leave a face of the box */
+  if (!batten_surface_may_collapse(s, h)) return false;
+  bool even = s->faces[a] == s->faces[b];
+  double x[3], n[3];
+  for (int k = 0; k < 3; k++) {
+    x[k] = even ? 0.5 * point(s, a)[k] + 0.5 * point(s, b)[k] : point(s, b)[k];
+    n[k] = normal(s, a)[k] + normal(s, b)[k];
+  }
+  vec_normalize(n);
+  if (!ring_allows(im, a, b, x, n) || (even && !ring_allows(im, b, a, x, n))) return false;
+  batten_surface_collapse(s, h);
+  memcpy(point(s, b), x, sizeof x);
+  memcpy(normal(s, b), n, sizeof n);
+  return true;
+}
+
+static void collapse_short(improver *im) {
+  batten_surface *s = im->s;
+  for (uint32_t h = 0; h < 3 * s->triangle_count; h++) {
+    if (s->origin[h] == MESH_NONE || !(edge_length(s, h) < SHORT_EDGE * im->edge)) continue;
+    if (!try_collapse(im, h) && s->twin[h] != MESH_NONE) try_collapse(im, s->twin[h]);
+  }
+}
+
+/* ---- flip --------------------------------------------------------------------------------------- */
+
+/* An edge is turned when the angles opposite to it add up to more than pi (not Delaunay), the two triangles lie about
+ * flat or get flatter by it, and both new ones face outward. */
+static bool wants_flip(const batten_surface *s, uint32_t h) {
+  uint32_t g = s->twin[h];
+  if (g == MESH_NONE || h > g) return false;
+  uint32_t v[4] = {s->origin[h], s->origin[g], s->origin[mesh_previous(h)], s->origin[mesh_previous(g)]};
+  const double *a = point(s, v[0]), *b = point(s, v[1]), *c = point(s, v[2]), *d = point(s, v[3]);
+  const double *na = normal(s, v[0]), *nb = normal(s, v[1]), *nc = normal(s, v[2]), *nd = normal(s, v[3]);
+  /* A margin, so that four points on a circle do not turn for ever. */
+  if (!(vec_angle(c, a, b) + vec_angle(d, b, a) > 3.1416 + 1e-3)) return false;
+  facet left = facet_of(a, b, c, na, nb, nc), right = facet_of(b, a, d, nb, na, nd);
+  facet first = facet_of(d, c, a, nd, nc, na), second = facet_of(c, d, b, nc, nd, nb);
+  double bend = vec_dot(left.n, right.n), bend_after = vec_dot(first.n, second.n);
+  double worst = fmin(left.quality, right.quality), worst_after = fmin(first.quality, second.quality);
+  if (!(bend_after > 0.8) && !(bend_after > bend)) return false;
+  if (!(fmin(first.facing, second.facing) > fmin(0.5, fmin(left.facing, right.facing)))) return false;
+  return worst_after > worst;
+}
+
+static void flip_sweeps(improver *im) {
+  batten_surface *s = im->s;
+  for (int sweep = 0; sweep < FLIP_SWEEPS; sweep++) {
+    size_t flips = 0;
+    for (uint32_t h = 0; h < 3 * s->triangle_count; h++) {
+      if (s->origin[h] == MESH_NONE || !wants_flip(s, h) || !batten_surface_may_flip(s, h)) continue;
+      batten_surface_flip(s, h);
+      flips++;
+    }
+    if (flips == 0) return;
+  }
+}
+
+/* ---- smoothing and projection ------------------------------------------------------------------- */
+
+/* Takes the coordinates out of d that a vertex on the box must keep. */
+static void keep_on_faces(unsigned char faces, double *d) {
+  for (int k = 0; k < 3; k++)
+    if (faces >> 2 * k & 3) d[k] = 0;
+}
+
+/* Where v should go along the surface: towards the mean of its neighbours; on the box, of its two neighbours there. */
+static void smooth_target(const improver *im, uint32_t v, double *x) {
+  const batten_surface *s = im->s;
+  uint32_t around[SURFACE_RING_MAX + 1];
+  size_t count = batten_surface_neighbours(s, v, around), used = 0;
+  double d[3] = {0, 0, 0}, n[3];
+  memcpy(x, point(s, v), sizeof d);
+  for (size_t i = 0; i < count; i++) {
+    if (s->faces[v] && i != 0 && i != count - 1) continue;
+    for (int k = 0; k < 3; k++) d[k] += point(s, around[i])[k] - x[k];
+    used++;
+  }
+  if (used == 0) return;
+  for (int k = 0; k < 3; k++) d[k] *= SMOOTHING / (double)used;
+  memcpy(n, normal(s, v), sizeof n);
+  keep_on_faces(s->faces[v], d);
+  keep_on_faces(s->faces[v], n);
+  vec_normalize(n);
+  double off = vec_dot(d, n);
+  if (s->faces[v] && (s->faces[v] & (s->faces[v] - 1))) return; /* on an edge of the box: only the surface decides */
+  for (int k = 0; k < 3; k++) x[k] += d[k] - off * n[k];
+}
+
+/* Newton step from x, at most `limit` long, within the faces of the box: x moves; n (may be NULL) gets the outward
+ * direction. Returns |f| / |grad f|, INFINITY where the gradient gives none. */
+static double newton(double f, const double *gradient, unsigned char faces, double limit, double *x, double *n) {
+  double u[3], length, d[3];
+  memcpy(u, gradient, sizeof u);
+  if (n && vec_normalize(u))
+    for (int k = 0; k < 3; k++) n[k] = -u[k];
+  memcpy(u, gradient, sizeof u);
+  keep_on_faces(faces, u);
+  memcpy(d, u, sizeof d);
+  if (!vec_normalize(d)) return f == 0 ? 0 : INFINITY;
+  length = vec_dot(u, d);
+  double step = -f / length;
+  if (!(step < limit)) step = limit;
+  if (!(step > -limit)) step = -limit;
+  for (int k = 0; k < 3; k++) x[k] += step * d[k];
+  return fabs(f) / length;
+}
+
+static batten_status make_room(improver *im) {
+  size_t count = im->s->vertex_count;
+  batten_context *ctx = im->s->ctx;
+  if (count <= im->room) return BATTEN_OK;
+  batten_free(ctx, im->target);
+  batten_free(ctx, im->values);
+  batten_free(ctx, im->gradients);
+  im->room = 0;
+  im->target = im->values = im->gradients = NULL;
+  if (!(im->target = batten_alloc_array(ctx, count, 3 * sizeof *im->target)) ||
+      !(im->values = batten_alloc_array(ctx, count, sizeof *im->values)) ||
+      !(im->gradients = batten_alloc_array(ctx, count, 3 * sizeof *im->gradients)))
+    return BATTEN_E_NOMEM;
+  im->room = count;
+  return BATTEN_OK;
+}
+
+/* One pass over all vertices of the compacted surface. */
+static batten_status smooth(improver *im) {
+  batten_surface *s = im->s;
+  batten_status st = make_room(im);
+  if (st < 0) return st;
+  for (uint32_t v = 0; v < s->vertex_count; v++) smooth_target(im, v, im->target + 3 * (size_t)v);
+  st = batten_sampler_gradients(im->sampler, s->vertex_count, im->target, im->values, im->gradients);
+  if (st < 0) return st;
+  for (uint32_t v = 0; v < s->vertex_count; v++) {
+    double *x = im->target + 3 * (size_t)v, n[3];
+    memcpy(n, normal(s, v), sizeof n);
+    newton(im->values[v], im->gradients + 3 * (size_t)v, s->faces[v], STEP_MAX * im->edge, x, n);
+    for (int attempt = 0; attempt < 3; attempt++) { /* all of the way, half, a quarter */
+      if (ring_allows(im, v, MESH_NONE, x, n)) {
+        memcpy(point(s, v), x, sizeof n);
+        memcpy(normal(s, v), n, sizeof n);
+        break;
+      }
+      for (int k = 0; k < 3; k++) x[k] = 0.5 * x[k] + 0.5 * point(s, v)[k];
+    }
+  }
+  return BATTEN_OK;
+}
+
+batten_status batten_surface_improve(batten_surface *s, batten_sampler *sampler, double edge, unsigned rounds) {
+  improver im = {.s = s, .sampler = sampler, .edge = edge};
+  batten_status st = BATTEN_OK;
+  for (unsigned round = 0; st >= 0 && round < rounds; round++) {
+    st = batten_progress(s->ctx, "improve", (double)round / rounds);
+    if (st >= 0) st = split_long(&im);
+    if (st < 0) break;
+    collapse_short(&im);
+    flip_sweeps(&im);
+    st = batten_surface_compact(s);
+    if (st >= 0) st = smooth(&im);
+    if (st >= 0) flip_sweeps(&im);
+  }
+  batten_free(s->ctx, im.target);
+  batten_free(s->ctx, im.values);
+  batten_free(s->ctx, im.gradients);
+  return st;
+}
+
+/* ---- settling on f = 0 -------------------------------------------------------------------------- */
+
+enum { NEWTON_ROUNDS = 8 };
+
+batten_status batten_surface_settle(batten_surface *s, batten_sampler *sampler, double edge, double tolerance,
+                                    double *distance_max) {
+  batten_context *ctx = s->ctx;
+  size_t count = s->vertex_count, active = count;
+  double worst = 0;
+  batten_status st = BATTEN_E_NOMEM;
+  double *values = NULL, *gradients = NULL, *x = NULL;
+  uint32_t *list = batten_alloc_array(ctx, count, sizeof *list);
+  if (!list || !(values = batten_alloc_array(ctx, count, sizeof *values)) ||
+      !(gradients = batten_alloc_array(ctx, count, 3 * sizeof *gradients)) ||
+      !(x = batten_alloc_array(ctx, count, 3 * sizeof *x)))
+    goto done;
+  for (uint32_t v = 0; v < count; v++) list[v] = v;
+  for (int round = 0; active > 0 && round <= NEWTON_ROUNDS; round++) {
+    st = batten_progress(ctx, "settle", (double)round / (NEWTON_ROUNDS + 1));
+    if (st < 0) goto done;
+    for (size_t i = 0; i < active; i++) memcpy(x + 3 * i, point(s, list[i]), 3 * sizeof *x);
+    st = batten_sampler_gradients(sampler, active, x, values, gradients);
+    if (st < 0) goto done;
+    size_t left = 0;
+    for (size_t i = 0; i < active; i++) {
+      uint32_t v = list[i];
+      double g[3];
+      memcpy(g, gradients + 3 * i, sizeof g);
+      double distance = newton(values[i], g, s->faces[v], STEP_MAX * edge, x + 3 * i, normal(s, v));
+      if (distance <= tolerance || round == NEWTON_ROUNDS) {
+        worst = fmax(worst, distance);
+      } else {
+        memcpy(point(s, v), x + 3 * i, sizeof g);
+        list[left++] = v;
+      }
+    }
+    active = left;
+  }
+  *distance_max = worst;
+  st = BATTEN_OK;
+done:
+  batten_free(ctx, x);
+  batten_free(ctx, gradients);
+  batten_free(ctx, values);
+  batten_free(ctx, list);
+  return st;
+}

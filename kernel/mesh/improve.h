@@ -1,0 +1,17 @@
+/* From the rough surface to an even mesh on f = 0; for kernel/mesh only. */
+#ifndef BATTEN_MESH_IMPROVE_H
+#define BATTEN_MESH_IMPROVE_H
+
+#include "sampler.h"
+#include "surface.h"
+
+/* Rounds of split, collapse, flip and tangential smoothing towards edges of the length `edge`; every move is followed
+ * by a Newton step on the field. */
+batten_status batten_surface_improve(batten_surface *s, batten_sampler *sampler, double edge, unsigned rounds);
+
+/* Puts every vertex on f = 0 to |f| / |grad f| <= tolerance; *distance_max: what is left. Vertices move at most by
+ * about `edge`, those on the box within its faces. */
+batten_status batten_surface_settle(batten_surface *s, batten_sampler *sampler, double edge, double tolerance,
+                                    double *distance_max);
+
+#endif

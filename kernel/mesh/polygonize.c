@@ -1,0 +1,207 @@
+/* The surface f = 0 as a triangle mesh: track (track.c), improve and settle (improve.c). See <batten/mesh.h>. */
+#include "polygonize.h"
+
+#include "basis/neighbours.h"
+#include "improve.h"
+#include "mesh_inner.h"
+#include "track.h"
+
+#include "base/checked.h"
+
+#include <string.h>
+
+static const double BOX_MARGIN = 0.25;                      /* of the seeds' largest extent, on every side */
+static const double CELL_SPACING = 0.7;                     /* of the median distance between neighbouring seeds */
+static const double CELL_LARGEST = 1.0 / 30, CELL_SMALLEST = 1.0 / 200; /* of the diagonal of the seeds' box */
+static const double CUBE_EDGES = 1.5; /* lattice cubes are wider than the edges: they give 2.5 vertices for each */
+static const double DIFFERENCE = 1e-4; /* half step of differences, in edges: error about 1e-8 on smooth fields */
+
+batten_polygonize_options batten_polygonize_options_default(void) {
+  return (batten_polygonize_options){
+      .struct_size = sizeof(batten_polygonize_options), .accuracy = 1e-6, .improve = 8};
+}
+
+/* ---- arguments ---------------------------------------------------------------------------------- */
+
+static batten_status check_options(batten_context *ctx, unsigned n, const batten_polygonize_options *o) {
+  batten_status st =
+      batten_check_struct(ctx, "batten_polygonize_options", o->struct_size, sizeof(batten_polygonize_options));
+  if (st < 0) return st;
+  if (!(o->cell >= 0) || isinf(o->cell))
+    return batten_fail(ctx, BATTEN_E_INVALID, "opt.cell: %g; give a length > 0, or 0 for one from the seeds", o->cell);
+  if (!(o->accuracy > 0) || !(o->accuracy < 1))
+    return batten_fail(ctx, BATTEN_E_INVALID, "opt.accuracy: %g; give a share of the box diagonal, 0 < accuracy < 1",
+                       o->accuracy);
+  bool given = false;
+  for (unsigned k = 0; k < n; k++) given = given || o->lower[k] != 0 || o->upper[k] != 0;
+  for (unsigned k = 0; given && k < n; k++)
+    if (!(o->lower[k] < o->upper[k]) || isinf(o->lower[k]) || isinf(o->upper[k]) || isinf(o->upper[k] - o->lower[k]))
+      return batten_fail(ctx, BATTEN_E_INVALID,
+                         "opt.lower[%u], opt.upper[%u]: %g, %g; give lower < upper, or all 0 for the seeds' box", k, k,
+                         o->lower[k], o->upper[k]);
+  return BATTEN_OK;
+}
+
+static batten_status check_arguments(batten_context *ctx, unsigned n, const batten_field *field, size_t seed_count,
+                                     const double *seeds, const batten_polygonize_options *o, const void *out) {
+  if (!field || !field->evaluate)
+    return batten_fail(ctx, BATTEN_E_INVALID, "field: NULL; give a field with its evaluate function");
+  if (field->dimension != n)
+    return batten_fail(ctx, BATTEN_E_INVALID, "field.dimension: %u; %s takes fields in %u dimensions",
+                       field->dimension, n == 3 ? "batten_polygonize" : "batten_trace_outline", n);
+  if (!out) return batten_fail(ctx, BATTEN_E_INVALID, "out: NULL; give the address of the result");
+  if (seed_count == 0 || !seeds)
+    return batten_fail(ctx, BATTEN_E_INVALID, "seeds: none; give points on or near the surface");
+  size_t values;
+  if (!batten_mul(seed_count, n, &values) || values > SIZE_MAX / sizeof *seeds)
+    return batten_fail(ctx, BATTEN_E_TOO_LARGE, "seed_count: %zu", seed_count);
+  size_t bad = batten_first_nonfinite(values, seeds);
+  if (bad < values)
+    return batten_fail(ctx, BATTEN_E_INVALID, "seeds[%zu][%zu]: %g; give finite coordinates", bad / n, bad % n,
+                       seeds[bad]);
+  return check_options(ctx, n, o);
+}
+
+/* ---- box and cell ------------------------------------------------------------------------------- */
+
+static int compare_doubles(const double *a, const double *b) { return *a < *b ? -1 : *a > *b; }
+
+/* k-th smallest of the values, which are reordered: quickselect. */
+static double select_value(size_t count, double *v, size_t wanted) {
+  size_t low = 0, high = count - 1;
+  while (low < high) {
+    double pivot = v[low + (high - low) / 2];
+    size_t i = low, j = high;
+    for (;;) {
+      while (compare_doubles(v + i, &pivot) < 0) i++;
+      while (compare_doubles(v + j, &pivot) > 0) j--;
+      if (i >= j) break;
+      double t = v[i];
+      v[i++] = v[j];
+      v[j--] = t;
+    }
+    if (j >= wanted) high = j;
+    else low = j + 1;
+  }
+  return v[wanted];
+}
+
+/* Median distance of a seed to the nearest other one, those at the same place left out; 0 when there is none. */
+static batten_status seed_spacing(batten_context *ctx, unsigned n, size_t count, const double *seeds, double *spacing) {
+  *spacing = 0;
+  if (count < 2) return BATTEN_OK;
+  size_t *index = batten_alloc_array(ctx, count, sizeof *index);
+  double *distance = index ? batten_alloc_array(ctx, count, sizeof *distance) : NULL;
+  batten_status st = distance ? batten_neighbours(ctx, n, count, seeds, 1, index, distance) : BATTEN_E_NOMEM;
+  if (st >= 0) {
+    size_t apart = 0;
+    for (size_t i = 0; i < count; i++)
+      if (distance[i] > 0) distance[apart++] = distance[i];
+    if (apart) *spacing = select_value(apart, distance, apart / 2);
+  }
+  batten_free(ctx, distance);
+  batten_free(ctx, index);
+  return st;
+}
+
+static double diagonal(unsigned n, const double *lower, const double *upper) {
+  double largest = 0, sum = 0;
+  for (unsigned k = 0; k < n; k++) largest = fmax(largest, upper[k] - lower[k]);
+  if (!(largest > 0)) return 0;
+  for (unsigned k = 0; k < n; k++) sum += (upper[k] - lower[k]) / largest * ((upper[k] - lower[k]) / largest);
+  return largest * sqrt(sum);
+}
+
+batten_status batten_polygonize_frame(batten_context *ctx, unsigned n, const batten_field *field, size_t seed_count,
+                                      const double *seeds, const batten_polygonize_options *opt, const void *out,
+                                      batten_frame *frame) {
+  batten_status st = check_arguments(ctx, n, field, seed_count, seeds, opt, out);
+  if (st < 0) return st;
+  batten_frame f = {.cell = opt->cell};
+  bool given = false;
+  double lower[3] = {0, 0, 0}, upper[3] = {0, 0, 0}, extent = 0;
+  for (unsigned k = 0; k < n; k++) {
+    lower[k] = upper[k] = seeds[k];
+    for (size_t i = 1; i < seed_count; i++) {
+      lower[k] = fmin(lower[k], seeds[n * i + k]);
+      upper[k] = fmax(upper[k], seeds[n * i + k]);
+    }
+    extent = fmax(extent, upper[k] - lower[k]);
+    given = given || opt->lower[k] != 0 || opt->upper[k] != 0;
+  }
+  for (unsigned k = 0; k < n; k++) {
+    f.lower[k] = given ? opt->lower[k] : lower[k] - BOX_MARGIN * extent;
+    f.upper[k] = given ? opt->upper[k] : upper[k] + BOX_MARGIN * extent;
+    if (!(f.lower[k] < f.upper[k]) || isinf(f.upper[k] - f.lower[k]))
+      return batten_fail(ctx, BATTEN_E_INVALID,
+                         "seeds: their box is [%g, %g] along axis %u; give opt.lower and opt.upper", lower[k], upper[k],
+                         k);
+  }
+  f.diagonal = diagonal(n, f.lower, f.upper);
+  if (f.cell == 0) {
+    double size = diagonal(n, lower, upper), spacing;
+    st = seed_spacing(ctx, n, seed_count, seeds, &spacing);
+    if (st < 0) return st;
+    if (!(size > 0) || size > f.diagonal) size = f.diagonal;
+    f.cell = spacing > 0 ? CELL_SPACING * spacing : CELL_LARGEST * size;
+    f.cell = fmin(fmax(f.cell, CELL_SMALLEST * size), CELL_LARGEST * size);
+  }
+  *frame = f;
+  return BATTEN_OK;
+}
+
+/* ---- the phases --------------------------------------------------------------------------------- */
+
+static batten_status warn(batten_context *ctx, const batten_polygonize_info *info, double tolerance) {
+  if (info->distance_max > tolerance)
+    return batten_fail(ctx, BATTEN_W_ACCURACY,
+                       "accuracy: vertices lie up to %g off f = 0, %g allowed; the field may not be smooth there",
+                       info->distance_max, tolerance);
+  if (info->clipped)
+    return batten_fail(ctx, BATTEN_W_CLIPPED, "the surface reaches its box and is cut there; enlarge opt.lower and "
+                       "opt.upper for all of it");
+  return BATTEN_OK;
+}
+
+static batten_status make_surface(batten_sampler *sampler, const batten_frame *frame, size_t seed_count,
+                                  const double *seeds, const batten_polygonize_options *opt, batten_surface *surface,
+                                  batten_polygonize_info *info) {
+  batten_rough_surface rough = {0};
+  double start = batten_now();
+  batten_status st = batten_track_surface(sampler, frame->lower, frame->upper, CUBE_EDGES * frame->cell, seed_count,
+                                          seeds, &rough);
+  if (st < 0) return st;
+  info->seeds_missed = rough.seeds_missed;
+  for (size_t v = 0; v < rough.vertex_count; v++) info->clipped = info->clipped || rough.faces[v];
+  st = batten_surface_build(sampler->ctx, &rough, surface);
+  if (st < 0) return st;
+  double tracked = batten_now();
+  info->time_track_s = tracked - start;
+  st = batten_surface_improve(surface, sampler, frame->cell, opt->improve);
+  if (st >= 0)
+    st = batten_surface_settle(surface, sampler, frame->cell, opt->accuracy * frame->diagonal, &info->distance_max);
+  info->time_improve_s = batten_now() - tracked;
+  return st;
+}
+
+batten_status batten_polygonize(batten_context *ctx, const batten_field *field, size_t seed_count, const double *seeds,
+                                const batten_polygonize_options *opt, batten_mesh **out,
+                                batten_polygonize_info *info) {
+  if (!ctx) return BATTEN_E_INVALID;
+  batten_polygonize_options o = opt ? *opt : batten_polygonize_options_default();
+  batten_frame frame;
+  batten_status st = batten_polygonize_frame(ctx, 3, field, seed_count, seeds, &o, out, &frame);
+  if (st < 0) return st;
+  batten_polygonize_info found = {.cell = frame.cell};
+  batten_surface surface = {.ctx = ctx};
+  batten_sampler sampler = {.ctx = ctx, .field = field, .evaluations_max = o.evaluations_max,
+                            .difference = DIFFERENCE * frame.cell};
+  st = make_surface(&sampler, &frame, seed_count, seeds, &o, &surface, &found);
+  found.evaluations = sampler.evaluations;
+  if (st >= 0)
+    st = batten_mesh_create(ctx, surface.vertex_count, surface.points, surface.triangle_count, surface.origin, out);
+  batten_surface_free(&surface);
+  if (st < 0) return st;
+  if (info) *info = found;
+  return warn(ctx, &found, o.accuracy * frame.diagonal);
+}

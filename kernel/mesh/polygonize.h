@@ -1,0 +1,18 @@
+/* What the polygoniser and the outline tracer share; for kernel/mesh only. */
+#ifndef BATTEN_MESH_POLYGONIZE_H
+#define BATTEN_MESH_POLYGONIZE_H
+
+#include <batten/mesh.h>
+
+typedef struct batten_frame {
+  double lower[3], upper[3], diagonal; /* of the clip box */
+  double cell;
+} batten_frame;
+
+/* Checks the arguments of batten_polygonize (n = 3) and batten_trace_outline (n = 2); box and cell, from the seeds
+ * where opt leaves them open. Time O(N log N). */
+batten_status batten_polygonize_frame(batten_context *ctx, unsigned n, const batten_field *field, size_t seed_count,
+                                      const double *seeds, const batten_polygonize_options *opt, const void *out,
+                                      batten_frame *frame);
+
+#endif

@@ -1,0 +1,296 @@
+/* A triangle surface that can be changed. See surface.h. */
+#include "surface.h"
+
+#include "table.h"
+#include "vec.h"
+
+#include <string.h>
+
+void batten_surface_free(batten_surface *s) {
+  batten_free(s->ctx, s->points);
+  batten_free(s->ctx, s->normals);
+  batten_free(s->ctx, s->faces);
+  batten_free(s->ctx, s->out);
+  batten_free(s->ctx, s->origin);
+  batten_free(s->ctx, s->twin);
+  *s = (batten_surface){.ctx = s->ctx};
+}
+
+static void set_twins(batten_surface *s, uint32_t h, uint32_t g) {
+  if (h != MESH_NONE) s->twin[h] = g;
+  if (g != MESH_NONE) s->twin[g] = h;
+}
+
+/* Turns back clockwise from half-edge h as far as it goes, and makes that the first of its origin. */
+static void set_first(batten_surface *s, uint32_t h) {
+  uint32_t first = h;
+  while (s->twin[h] != MESH_NONE) {
+    h = mesh_next(s->twin[h]);
+    if (h == first) break;
+  }
+  s->out[s->origin[h]] = h;
+}
+
+/* ---- building ----------------------------------------------------------------------------------- */
+
+static void set_normals(batten_surface *s) {
+  memset(s->normals, 0, s->vertex_count * 3 * sizeof *s->normals);
+  for (size_t t = 0; t < s->triangle_count; t++) {
+    const uint32_t *v = s->origin + 3 * t;
+    double n[3];
+    vec_triangle_normal(s->points + 3 * (size_t)v[0], s->points + 3 * (size_t)v[1], s->points + 3 * (size_t)v[2], n);
+    for (int k = 0; k < 3; k++)
+      for (size_t d = 0; d < 3; d++) s->normals[3 * (size_t)v[k] + d] += n[d];
+  }
+  for (size_t v = 0; v < s->vertex_count; v++) vec_normalize(s->normals + 3 * v);
+}
+
+static batten_status pair_half_edges(batten_surface *s, const uint32_t *order) {
+  size_t half_edges = 3 * s->triangle_count;
+  for (size_t i = 0; i < half_edges; i++) {
+    uint32_t h = order[i], g = i + 1 < half_edges ? order[i + 1] : h;
+    uint32_t a = s->origin[h], b = s->origin[mesh_next(h)];
+    s->twin[h] = MESH_NONE;
+    if (g != h && s->origin[g] == b && s->origin[mesh_next(g)] == a) {
+      set_twins(s, h, g);
+      i++;
+    } else if (s->faces[a] == 0 || s->faces[b] == 0) {
+      return batten_fail(s->ctx, BATTEN_E_INTERNAL, "tracked surface: open at the edge %lu-%lu inside of the box",
+                         (unsigned long)a, (unsigned long)b);
+    }
+  }
+  for (size_t v = 0; v < s->vertex_count; v++) s->out[v] = MESH_NONE;
+  for (uint32_t h = 0; h < half_edges; h++)
+    if (s->out[s->origin[h]] == MESH_NONE) set_first(s, h);
+  return BATTEN_OK;
+}
+
+batten_status batten_surface_build(batten_context *ctx, batten_rough_surface *rough, batten_surface *out) {
+  batten_surface s = {.ctx = ctx, .vertex_count = rough->vertex_count, .triangle_count = rough->triangle_count};
+  batten_status st = BATTEN_E_NOMEM;
+  s.points = rough->vertices;
+  s.faces = rough->faces;
+  s.origin = rough->triangles;
+  *rough = (batten_rough_surface){0};
+  s.points_capacity = s.faces_capacity = s.normals_capacity = s.out_capacity = s.vertex_count;
+  s.origin_capacity = s.twin_capacity = 3 * s.triangle_count;
+  uint32_t *order = batten_alloc_array(ctx, 3 * s.triangle_count, sizeof *order);
+  if (!order || !(s.normals = batten_alloc_array(ctx, s.vertex_count, 3 * sizeof *s.normals)) ||
+      !(s.out = batten_alloc_array(ctx, s.vertex_count, sizeof *s.out)) ||
+      !(s.twin = batten_alloc_array(ctx, 3 * s.triangle_count, sizeof *s.twin)))
+    goto done;
+  st = batten_mesh_sort_edges(ctx, s.vertex_count, s.triangle_count, s.origin, order);
+  if (st < 0) goto done;
+  st = pair_half_edges(&s, order);
+  if (st < 0) goto done;
+  set_normals(&s);
+  *out = s;
+done:
+  if (st < 0) batten_surface_free(&s);
+  batten_free(ctx, order);
+  return st;
+}
+
+/* ---- rings -------------------------------------------------------------------------------------- */
+
+size_t batten_surface_ring(const batten_surface *s, uint32_t v, uint32_t *half_edges) {
+  uint32_t first = s->out[v], h = first;
+  size_t count = 0;
+  do {
+    if (count == SURFACE_RING_MAX) return 0;
+    half_edges[count++] = h;
+    h = s->twin[mesh_previous(h)];
+  } while (h != MESH_NONE && h != first);
+  return count;
+}
+
+size_t batten_surface_neighbours(const batten_surface *s, uint32_t v, uint32_t *vertices) {
+  uint32_t ring[SURFACE_RING_MAX];
+  size_t count = batten_surface_ring(s, v, ring);
+  for (size_t i = 0; i < count; i++) vertices[i] = s->origin[mesh_next(ring[i])];
+  if (count && batten_surface_on_boundary(s, v)) {
+    vertices[count] = s->origin[mesh_previous(ring[count - 1])];
+    count++;
+  }
+  return count;
+}
+
+static bool are_neighbours(const batten_surface *s, uint32_t a, uint32_t b) {
+  uint32_t around[SURFACE_RING_MAX + 1];
+  size_t count = batten_surface_neighbours(s, a, around);
+  for (size_t i = 0; i < count; i++)
+    if (around[i] == b) return true;
+  return count == 0; /* not known */
+}
+
+/* ---- split -------------------------------------------------------------------------------------- */
+
+static batten_status make_room(batten_surface *s) {
+  size_t v = s->vertex_count + 1, h = 3 * s->triangle_count + 6;
+  batten_context *ctx = s->ctx;
+  if (v >= UINT32_MAX || h >= UINT32_MAX)
+    return batten_fail(ctx, BATTEN_E_TOO_LARGE, "opt.cell: %zu triangles are too many; enlarge it", s->triangle_count);
+  if (batten_reserve(ctx, (void **)&s->points, &s->points_capacity, v, 3 * sizeof *s->points) < 0 ||
+      batten_reserve(ctx, (void **)&s->normals, &s->normals_capacity, v, 3 * sizeof *s->normals) < 0 ||
+      batten_reserve(ctx, (void **)&s->faces, &s->faces_capacity, v, 1) < 0 ||
+      batten_reserve(ctx, (void **)&s->out, &s->out_capacity, v, sizeof *s->out) < 0 ||
+      batten_reserve(ctx, (void **)&s->origin, &s->origin_capacity, h, sizeof *s->origin) < 0 ||
+      batten_reserve(ctx, (void **)&s->twin, &s->twin_capacity, h, sizeof *s->twin) < 0)
+    return BATTEN_E_NOMEM;
+  return BATTEN_OK;
+}
+
+/* The half at the end of h (a -> b, apex c) becomes the new triangle m b c: returns its half-edge m -> b. */
+static uint32_t split_half(batten_surface *s, uint32_t h, uint32_t m) {
+  uint32_t hn = mesh_next(h), n = 3 * (uint32_t)s->triangle_count++;
+  uint32_t b = s->origin[hn], c = s->origin[mesh_next(hn)];
+  s->origin[n] = m;
+  s->origin[n + 1] = b;
+  s->origin[n + 2] = c;
+  set_twins(s, n + 1, s->twin[hn]);
+  s->origin[hn] = m;
+  set_twins(s, hn, n + 2);
+  if (s->out[b] == hn) s->out[b] = n + 1;
+  return n;
+}
+
+uint32_t batten_surface_split(batten_surface *s, uint32_t h, const double *x) {
+  if (make_room(s) < 0) return MESH_NONE;
+  uint32_t m = (uint32_t)s->vertex_count++, g = s->twin[h], a = s->origin[h], b = s->origin[mesh_next(h)];
+  memcpy(s->points + 3 * (size_t)m, x, 3 * sizeof *x);
+  double *n = s->normals + 3 * (size_t)m;
+  for (size_t k = 0; k < 3; k++) n[k] = s->normals[3 * (size_t)a + k] + s->normals[3 * (size_t)b + k];
+  vec_normalize(n);
+  s->faces[m] = g == MESH_NONE ? s->faces[a] & s->faces[b] : 0;
+  uint32_t mb = split_half(s, h, m);
+  s->out[m] = mb;
+  s->twin[mb] = MESH_NONE;
+  if (g == MESH_NONE) return m;
+  uint32_t ma = split_half(s, g, m);
+  set_twins(s, h, ma);
+  set_twins(s, mb, g);
+  return m;
+}
+
+/* ---- collapse ----------------------------------------------------------------------------------- */
+
+bool batten_surface_may_collapse(const batten_surface *s, uint32_t h) {
+  uint32_t g = s->twin[h], a = s->origin[h], b = s->origin[mesh_next(h)], around_a[SURFACE_RING_MAX + 1],
+           around_b[SURFACE_RING_MAX + 1];
+  bool a_edge = batten_surface_on_boundary(s, a), b_edge = batten_surface_on_boundary(s, b);
+  if (a_edge && (g != MESH_NONE || !b_edge)) return false;
+  size_t na = batten_surface_neighbours(s, a, around_a), nb = batten_surface_neighbours(s, b, around_b), common = 0;
+  if (na == 0 || nb == 0 || na + nb > SURFACE_RING_MAX) return false;
+  for (size_t i = 0; i < na; i++)
+    for (size_t j = 0; j < nb; j++) common += around_a[i] == around_b[j];
+  if (common != (g == MESH_NONE ? 1 : 2)) return false;
+  uint32_t apexes[2] = {s->origin[mesh_previous(h)], g == MESH_NONE ? MESH_NONE : s->origin[mesh_previous(g)]};
+  for (int i = 0; i < 2 && apexes[i] != MESH_NONE; i++) { /* they lose a neighbour, and need two triangles or three */
+    uint32_t around[SURFACE_RING_MAX + 1];
+    size_t n = batten_surface_neighbours(s, apexes[i], around);
+    if (n == 0 || n < (batten_surface_on_boundary(s, apexes[i]) ? 3u : 4u)) return false;
+  }
+  return true;
+}
+
+/* Takes the triangle of h (a -> b, apex c) away: the triangles beyond its other two sides become neighbours. */
+static void close_gap(batten_surface *s, uint32_t h) {
+  uint32_t hn = mesh_next(h), hp = mesh_previous(h), c = s->origin[hp];
+  uint32_t cb = s->twin[hn], ac = s->twin[hp];
+  if (cb != MESH_NONE) s->twin[cb] = ac;
+  if (ac != MESH_NONE) s->twin[ac] = cb;
+  if (s->out[c] == hp) s->out[c] = cb;
+  s->origin[h] = s->origin[hn] = s->origin[hp] = MESH_NONE;
+}
+
+void batten_surface_collapse(batten_surface *s, uint32_t h) {
+  uint32_t ring[SURFACE_RING_MAX], g = s->twin[h], a = s->origin[h], b = s->origin[mesh_next(h)];
+  size_t count = batten_surface_ring(s, a, ring);
+  /* Of the half-edges around, these two leave b or a afterwards. */
+  uint32_t beyond[4] = {s->twin[mesh_previous(h)], s->twin[mesh_next(h)], MESH_NONE, MESH_NONE};
+  if (g != MESH_NONE) {
+    beyond[2] = s->twin[mesh_previous(g)];
+    beyond[3] = s->twin[mesh_next(g)];
+  }
+  for (size_t i = 0; i < count; i++) s->origin[ring[i]] = b;
+  close_gap(s, h);
+  /* In g (b -> a, apex d) the roles are: next side a -> d, previous side d -> b. */
+  if (g != MESH_NONE) close_gap(s, g);
+  s->out[a] = MESH_NONE;
+  /* beyond[0]: was a -> c; beyond[1]: c -> b; beyond[2]: b -> d; beyond[3]: was d -> a. */
+  uint32_t leaves_b = beyond[0] != MESH_NONE   ? beyond[0]
+                      : beyond[2] != MESH_NONE ? beyond[2]
+                      : beyond[1] != MESH_NONE ? mesh_next(beyond[1])
+                                               : mesh_next(beyond[3]);
+  set_first(s, leaves_b);
+}
+
+/* ---- flip --------------------------------------------------------------------------------------- */
+
+bool batten_surface_may_flip(const batten_surface *s, uint32_t h) {
+  uint32_t g = s->twin[h];
+  if (g == MESH_NONE) return false;
+  uint32_t a = s->origin[h], b = s->origin[g], c = s->origin[mesh_previous(h)], d = s->origin[mesh_previous(g)];
+  uint32_t around[SURFACE_RING_MAX + 1];
+  uint32_t ends[2] = {a, b};
+  for (int i = 0; i < 2; i++) {
+    size_t n = batten_surface_neighbours(s, ends[i], around);
+    if (n == 0 || n < (batten_surface_on_boundary(s, ends[i]) ? 3u : 4u)) return false;
+  }
+  return c != d && !are_neighbours(s, c, d);
+}
+
+void batten_surface_flip(batten_surface *s, uint32_t h) {
+  uint32_t hn = mesh_next(h), hp = mesh_previous(h), g = s->twin[h], gn = mesh_next(g), gp = mesh_previous(g);
+  uint32_t a = s->origin[h], b = s->origin[g], c = s->origin[hp], d = s->origin[gp];
+  uint32_t bc = s->twin[hn], ca = s->twin[hp], ad = s->twin[gn], db = s->twin[gp];
+  s->origin[h] = d; /* triangle d c a */
+  s->origin[hn] = c;
+  s->origin[hp] = a;
+  s->origin[g] = c; /* triangle c d b */
+  s->origin[gn] = d;
+  s->origin[gp] = b;
+  set_twins(s, h, g);
+  s->twin[hn] = s->twin[hp] = s->twin[gn] = s->twin[gp] = MESH_NONE;
+  set_twins(s, hn, ca);
+  set_twins(s, hp, ad);
+  set_twins(s, gn, db);
+  set_twins(s, gp, bc);
+  if (s->out[a] == h || s->out[a] == gn) s->out[a] = hp;
+  if (s->out[b] == g || s->out[b] == hn) s->out[b] = gp;
+  if (s->out[c] == hp) s->out[c] = hn;
+  if (s->out[d] == gp) s->out[d] = gn;
+}
+
+/* ---- compaction --------------------------------------------------------------------------------- */
+
+batten_status batten_surface_compact(batten_surface *s) {
+  uint32_t vertices = 0, triangles = 0;
+  uint32_t *number = batten_alloc_array(s->ctx, s->vertex_count + s->triangle_count, sizeof *number);
+  if (!number) return BATTEN_E_NOMEM;
+  uint32_t *vertex_number = number, *triangle_number = number + s->vertex_count;
+  for (size_t v = 0; v < s->vertex_count; v++) {
+    if (s->out[v] == MESH_NONE) continue;
+    memmove(s->points + 3 * (size_t)vertices, s->points + 3 * v, 3 * sizeof *s->points);
+    memmove(s->normals + 3 * (size_t)vertices, s->normals + 3 * v, 3 * sizeof *s->normals);
+    s->faces[vertices] = s->faces[v];
+    s->out[vertices] = s->out[v];
+    vertex_number[v] = vertices++;
+  }
+  for (size_t t = 0; t < s->triangle_count; t++)
+    if (s->origin[3 * t] != MESH_NONE) triangle_number[t] = triangles++;
+  for (size_t t = 0; t < s->triangle_count; t++) {
+    if (s->origin[3 * t] == MESH_NONE) continue;
+    size_t to = triangle_number[t];
+    for (size_t k = 0; k < 3; k++) {
+      uint32_t g = s->twin[3 * t + k];
+      s->origin[3 * to + k] = vertex_number[s->origin[3 * t + k]];
+      s->twin[3 * to + k] = g == MESH_NONE ? MESH_NONE : 3 * triangle_number[g / 3] + g % 3;
+    }
+  }
+  for (size_t v = 0; v < vertices; v++) s->out[v] = 3 * triangle_number[s->out[v] / 3] + s->out[v] % 3;
+  s->vertex_count = vertices;
+  s->triangle_count = triangles;
+  batten_free(s->ctx, number);
+  return BATTEN_OK;
+}
