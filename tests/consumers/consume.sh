@@ -42,7 +42,7 @@ with_pkg_config() {
   [ "$1" = shared ] || option=--static
   for part in batten batten-exchange; do
     [ -f "$libdir/pkgconfig/$part.pc" ] || continue
-    $CC $flags "$program/$part.c" -o "$scratch/$part" $(pkg-config $option --cflags --libs $part)
+    $CC $flags "$program/$part.c" -o "$scratch/$part" $(pkg-config $option --cflags --libs $part) -lm
     try "$1" "$scratch/$part"
   done
 }
@@ -70,10 +70,11 @@ with_subproject() {
   mkdir -p "$scratch/host/subprojects"
   cp "$program/meson.build" "$program/batten.c" "$scratch/host/"
   ln -s "$SOURCE" "$scratch/host/subprojects/batten"
-  printf '[wrap-file]\ndirectory = batten\n\n[provide]\ndependency_names = batten\n' >"$scratch/host/subprojects/batten.wrap"
+  printf '[wrap-file]\ndirectory = batten\n\n[provide]\ndependency_names = batten\n' \
+    >"$scratch/host/subprojects/batten.wrap"
   # Debug builds of what is compiled here once more: this is about building, not about speed.
-  CC=$CC "$MESON" setup "$scratch/build" "$scratch/host" --wrap-mode=forcefallback -Doptimization=0 -Ddefault_library=static \
-    -Dbatten:blas="$BLAS" >"$scratch/log" 2>&1 || { cat "$scratch/log"; exit 1; }
+  CC=$CC "$MESON" setup "$scratch/build" "$scratch/host" --wrap-mode=forcefallback -Doptimization=0 \
+    -Ddefault_library=static -Dbatten:blas="$BLAS" -Dbatten:blas_libs="$BLAS_LIBS" >"$scratch/log" 2>&1 || { cat "$scratch/log"; exit 1; }
   if grep -E 'dependency (zlib|libpng|jansson) found' "$scratch/log"; then
     echo "as a subproject batten asks for more than BLAS and LAPACK"
     exit 1
