@@ -157,10 +157,10 @@ static double thickness(const spline_system *s, const principal_axes *axes, unsi
   return largest;
 }
 
-/* Without gradients the points must not lie in one plane (line in 2-D): the linear part would not be
- * determined. */
+/* The points must not lie in one plane (line in 2-D): the linear part would not be determined; and where gradients are
+ * given, m >= 3, and the square of the plane's equation vanishes with its gradient. */
 static batten_status check_flat(batten_context *ctx, const spline_system *s) {
-  if (s->m < 2 || s->n < 2 || s->gradient_count) return BATTEN_OK;
+  if (s->m < 2 || s->n < 2) return BATTEN_OK;
   principal_axes axes = find_axes(s);
   double far = s->scale;
   for (unsigned a = 0; a < s->n; a++) far = fmax(far, fabs(s->origin[a]));

@@ -10,6 +10,7 @@
 #include "basis/green.h"
 
 #include <batten/saddle.h>
+#include <float.h>
 
 /* Residuals above this part of the data's range are a warning. */
 static const double RESIDUAL_PROMISED = 1e-10;
@@ -264,8 +265,10 @@ static batten_status find_residuals(fit *t) {
 }
 
 static batten_status judge(const fit *t) {
-  double worst = fmax(t->info.residual_max, t->info.gradient_residual_max);
-  if (worst <= RESIDUAL_PROMISED) return BATTEN_OK;
+  double middle, range = value_range(t->data, &middle), worst = fmax(t->info.residual_max, t->info.gradient_residual_max);
+  /* Values about 1e8 with a range of 1 have only 8 digits of it to be met. */
+  double digits = range > 0 ? 4 * DBL_EPSILON * (fabs(middle) / range) : 0;
+  if (worst <= RESIDUAL_PROMISED + digits) return BATTEN_OK;
   return batten_fail(t->ctx, BATTEN_W_ACCURACY, "residual: %.3g of the data's range, above %g (reciprocal condition %.3g); "
                      "merge points that nearly coincide, lower m, or set opt.smoothing", worst, RESIDUAL_PROMISED,
                      t->info.saddle.rcond);
@@ -278,7 +281,7 @@ batten_status batten_spline_fit(batten_context *ctx, const batten_spline_data *d
   fit t = {.ctx = ctx, .data = data, .opt = opt ? *opt : batten_spline_options_default()};
   batten_status st = batten_spline_check_data(ctx, data, &t.opt);
   if (st < 0) return st;
-  if ((st = batten_spline_system_make(ctx, data, t.opt.m, &t.system)) < 0) goto done;
+  if ((st = batten_spline_system_make(ctx, data, &t.opt, &t.system)) < 0) goto done;
   if ((st = batten_spline_check_points(ctx, &t.system)) < 0) goto done;
   if ((st = make_right_side(&t)) < 0) goto done;
   if ((st = solve(&t)) < 0) goto done;

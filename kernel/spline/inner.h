@@ -28,9 +28,9 @@ typedef struct spline_system {
 } spline_system;
 
 /* Units, coordinates and polynomial part of checked data. Fails: INVALID (extent overflows), NOMEM. Freed in both cases
- * by batten_spline_system_free. */
-batten_status batten_spline_system_make(batten_context *ctx, const batten_spline_data *data, unsigned m,
-                                        spline_system *system);
+ * by batten_spline_system_free; opt's arrays must live as long. */
+batten_status batten_spline_system_make(batten_context *ctx, const batten_spline_data *data,
+                                        const batten_spline_options *opt, spline_system *system);
 void batten_spline_system_free(batten_context *ctx, spline_system *system);
 /* The fill callback of the saddle solver; user is a spline_system. */
 void batten_spline_system_fill(const void *user, size_t row0, size_t rows, size_t col0, size_t cols, double *tile,

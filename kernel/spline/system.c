@@ -42,15 +42,17 @@ static void fill_polynomial(const batten_spline_data *data, spline_system *s) {
   }
 }
 
-batten_status batten_spline_system_make(batten_context *ctx, const batten_spline_data *data, unsigned m,
-                                        spline_system *s) {
+batten_status batten_spline_system_make(batten_context *ctx, const batten_spline_data *data,
+                                        const batten_spline_options *opt, spline_system *s) {
   const size_t n = data->n, count = data->count, gradients = data->gradient_count;
   *s = (spline_system){.n = data->n,
-                       .m = m,
-                       .power = batten_green_power(data->n, m),
+                       .m = opt->m,
+                       .power = batten_green_power(data->n, opt->m),
                        .count = count,
                        .gradient_count = gradients,
-                       .basis = batten_polynomial_basis(data->n, m - 1),
+                       .basis = batten_polynomial_basis(data->n, opt->m - 1),
+                       .smoothing = opt->smoothing,
+                       .smoothing_per_point = opt->smoothing_per_point,
                        .code = batten_spline_code()};
   batten_status st = set_box(ctx, data, s);
   if (st < 0) return st;
