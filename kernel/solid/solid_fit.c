@@ -1,0 +1,392 @@
+/* A solid from scattered surface points: fit with the carrier, look at the signs, and where they are not settled
+ * orient the points and fit again with the orientation as data.   [Savchenko et al. 1995, section 3] */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/checked.h"
+#include "solid/solid_inner.h"
+
+batten_solid_options batten_solid_options_default(void) {
+  return (batten_solid_options){.struct_size = sizeof(batten_solid_options),
+                                .energy_points = 1000,
+                                .pair_distance = 0.5,
+                                .check_cells = 40,
+                                .spline = batten_spline_options_default()};
+}
+
+/* One way of fitting and what came of it. */
+typedef struct attempt {
+  batten_solid *solid;
+  batten_status status; /* positive: from the spline */
+  batten_spline_info spline;
+  double value_range;
+  batten_orient_data data; /* AUTO: the carrier alone */
+  batten_sign_check check;
+} attempt;
+
+typedef struct fit_state {
+  batten_context *ctx;
+  batten_solid_options opt;
+  surface_data data;
+  batten_carrier *carrier; /* owned; NULL until somebody needs it */
+  double *normals;         /* that are in use; owned when estimated */
+  batten_orientation_used orientation;
+  attempt best; /* so far */
+  batten_solid_info info;
+} fit_state;
+
+/* ---- checks -------------------------------------------------------------------------------------- */
+
+static batten_status check_enum(batten_context *ctx, const char *name, int value, int last) {
+  if (value >= 0 && value <= last) return BATTEN_OK;
+  return batten_fail(ctx, BATTEN_E_INVALID, "opt.%s: %d; give one of its names", name, value);
+}
+
+static batten_status check_options(batten_context *ctx, unsigned n, const batten_solid_options *o) {
+  batten_status st = batten_check_struct(ctx, "batten_solid_options", o->struct_size, sizeof *o);
+  if (st >= 0) st = batten_check_struct(ctx, "batten_spline_options", o->spline.struct_size, sizeof o->spline);
+  if (st >= 0) st = check_enum(ctx, "orientation", (int)o->orientation, BATTEN_ORIENT_ESTIMATE);
+  if (st >= 0) st = check_enum(ctx, "orient_data", (int)o->orient_data, BATTEN_ORIENT_DATA_PAIRS);
+  if (st >= 0) st = check_enum(ctx, "orient_method", (int)o->orient_method, BATTEN_ORIENT_METHOD_PLANES);
+  if (st < 0) return st;
+  if (!(o->merge_radius >= 0) || !isfinite(o->merge_radius))
+    return batten_fail(ctx, BATTEN_E_INVALID, "opt.merge_radius: %g; give a length >= 0", o->merge_radius);
+  if (!(o->pair_distance > 0 && o->pair_distance <= 1))
+    return batten_fail(ctx, BATTEN_E_INVALID, "opt.pair_distance: %g; give 0 < it <= 1", o->pair_distance);
+  if (o->check_cells < 8 || o->check_cells > 1000)
+    return batten_fail(ctx, BATTEN_E_INVALID, "opt.check_cells: %zu; give 8 to 1000", o->check_cells);
+  if (2 * o->spline.m <= n || o->spline.m > 4)
+    return batten_fail(ctx, BATTEN_E_INVALID, "opt.spline.m: %u; give %u to 4 in %u dimensions", o->spline.m,
+                       n / 2 + 1, n);
+  if (o->orientation == BATTEN_ORIENT_GIVEN && !o->normals)
+    return batten_fail(ctx, BATTEN_E_INVALID, "opt.normals: NULL; orientation given needs them");
+  unsigned of_carrier = o->carrier ? batten_carrier_field(o->carrier).dimension : n;
+  if (of_carrier != n)
+    return batten_fail(ctx, BATTEN_E_INVALID, "opt.carrier: of dimension %u, the points are of %u", of_carrier, n);
+  return BATTEN_OK;
+}
+
+static batten_status check_arguments(batten_context *ctx, unsigned n, size_t count, const double *points,
+                                     const void *out) {
+  size_t bytes;
+  if (n < 1 || n > 3) return batten_fail(ctx, BATTEN_E_INVALID, "n: %u; give 1, 2 or 3", n);
+  if (!out) return batten_fail(ctx, BATTEN_E_INVALID, "out: NULL; give the place for the solid");
+  if (count == 0) return batten_fail(ctx, BATTEN_E_INVALID, "count: 0; give points");
+  if (!points) return batten_fail(ctx, BATTEN_E_INVALID, "points: NULL; give [%zu][%u] numbers", count, n);
+  if (!batten_mul3(count, n, sizeof(double), &bytes))
+    return batten_fail(ctx, BATTEN_E_TOO_LARGE, "count: %zu; too many", count);
+  return BATTEN_OK;
+}
+
+/* Carriers that a spline of order m contains whole, known by their kind. */
+static bool kind_is_reproduced(const batten_carrier *c, unsigned m) {
+  batten_carrier_parts parts;
+  batten_carrier_get_parts(c, &parts);
+  switch (parts.kind) {
+    case BATTEN_CARRIER_NONE:
+      return true;
+    case BATTEN_CARRIER_HALF_SPACE:
+      return m >= 2;
+    case BATTEN_CARRIER_BALL:
+    case BATTEN_CARRIER_ELLIPSOID:
+      return m >= 3;
+    default:
+      return false;
+  }
+}
+
+static batten_status refuse_carrier(batten_context *ctx, const batten_carrier *c, unsigned m) {
+  batten_carrier_parts parts;
+  batten_carrier_get_parts(c, &parts);
+  const char *name = batten_carrier_kind_name(parts.kind);
+  if (parts.kind == BATTEN_CARRIER_NONE)
+    return batten_fail(ctx, BATTEN_E_INVALID,
+                       "opt.carrier: none needs oriented points; give opt.normals, or set "
+                       "opt.orientation to estimate");
+  return batten_fail(ctx, BATTEN_E_INVALID,
+                     "opt.carrier: the spline of order m = %u reproduces this %s, so that f is 0 "
+                     "everywhere; %s",
+                     m, name,
+                     m >= 3 ? "set opt.spline.m to 2, or opt.orientation to given or estimate"
+                            : "take a ball, an ellipsoid, or NULL for a fitted one");
+}
+
+/* ---- fits ---------------------------------------------------------------------------------------- */
+
+static batten_status need_carrier(fit_state *f) {
+  if (f->carrier) return BATTEN_OK;
+  return batten_carrier_fit(f->ctx, f->data.n, f->data.count, f->data.points, &f->carrier);
+}
+
+enum { TRIALS = 128 };
+
+/* Whether U equals f_c to rounding off the data too: then f = f_c - U is noise. Looks at fixed pseudo-random points
+ * in the box. *scale: the largest |f_c| there. */
+static batten_status is_reproduced(fit_state *f, const batten_solid *s, bool *reproduced, double *scale) {
+  size_t n = f->data.n;
+  double *x = batten_alloc_array(f->ctx, TRIALS, (n + 2) * sizeof *x);
+  if (!x) return BATTEN_E_NOMEM;
+  double *carrier = x + TRIALS * n, *value = carrier + TRIALS, largest = 0, difference = 0;
+  uint64_t state = 1;
+  for (size_t i = 0; i < TRIALS * n; i++) {
+    state =
+        state * 6364136223846793005u + 1442695040888963407u; /* Knuth's linear congruence; the high bits are good */
+    double t = (double)(state >> 11) * 0x1p-53;
+    x[i] = f->data.lower[i % n] + t * (f->data.upper[i % n] - f->data.lower[i % n]);
+  }
+  batten_status st = batten_carrier_evaluate(f->ctx, f->carrier, TRIALS, x, carrier, NULL, NULL);
+  if (st >= 0) st = batten_solid_evaluate(f->ctx, s, TRIALS, x, value, NULL, NULL);
+  for (size_t i = 0; i < TRIALS; i++) {
+    largest = fmax(largest, fabs(carrier[i]));
+    difference = fmax(difference, fabs(value[i]));
+  }
+  /* 1e-8: the rounding of ill-conditioned fits; fits that mean something have 1e-3 and more */
+  *reproduced = !(difference > 1e-8 * largest);
+  *scale = largest;
+  batten_free(f->ctx, x);
+  return st;
+}
+
+static batten_status fit_with_carrier(fit_state *f, attempt *a) {
+  const surface_data *d = &f->data;
+  batten_context *ctx = f->ctx;
+  batten_spline *spline = NULL;
+  double *values = NULL, scale = 0, least = INFINITY, most = -INFINITY;
+  bool reproduced = false;
+  batten_status st = need_carrier(f), fitted;
+  if (st < 0) return st;
+  if (kind_is_reproduced(f->carrier, f->opt.spline.m)) return refuse_carrier(ctx, f->carrier, f->opt.spline.m);
+  values = batten_alloc_array(ctx, d->count, sizeof *values);
+  st = values ? batten_carrier_evaluate(ctx, f->carrier, d->count, d->points, values, NULL, NULL) : BATTEN_E_NOMEM;
+  if (st < 0) goto done;
+  batten_spline_data data = batten_spline_data_default();
+  data.n = d->n;
+  data.count = d->count;
+  data.points = d->points;
+  data.values = values;
+  batten_spline_options o = f->opt.spline;
+  o.smoothing_per_point = d->smoothing;
+  st = fitted = batten_spline_fit(ctx, &data, &o, &spline, &a->spline);
+  if (st >= 0) st = batten_solid_new(ctx, spline, f->carrier, 1, d->count, d->points, d->lower, d->upper, &a->solid);
+  if (st >= 0) st = is_reproduced(f, a->solid, &reproduced, &scale);
+  if (st >= 0 && reproduced) st = refuse_carrier(ctx, f->carrier, f->opt.spline.m);
+  if (st < 0) goto done;
+  for (size_t i = 0; i < d->count; i++) {
+    least = fmin(least, values[i]);
+    most = fmax(most, values[i]);
+  }
+  /* A carrier that passes through all points gives them equal values: then its own size is the measure. */
+  a->value_range = most - least > 1e-6 * scale ? most - least : scale;
+  a->status = fitted;
+done:
+  batten_spline_free(spline);
+  batten_free(ctx, values);
+  return st;
+}
+
+static batten_status check_attempt(fit_state *f, attempt *a) {
+  double start = batten_now();
+  batten_status st = batten_solid_check_sign(f->ctx, &f->data, f->opt.check_cells, a->data == BATTEN_ORIENT_DATA_AUTO,
+                                             a->solid, &a->check);
+  f->info.time_check_s += batten_now() - start;
+  return st;
+}
+
+static batten_status try_carrier(fit_state *f, attempt *a) {
+  double start = batten_now();
+  batten_status st = fit_with_carrier(f, a);
+  f->info.time_fit_s += batten_now() - start;
+  return st < 0 ? st : check_attempt(f, a);
+}
+
+static batten_status try_oriented(fit_state *f, batten_orient_data data, attempt *a) {
+  double start = batten_now();
+  batten_status st = BATTEN_OK;
+  a->data = data;
+  if (data == BATTEN_ORIENT_DATA_GRADIENTS) {
+    st = batten_solid_fit_gradients(f->ctx, &f->data, f->normals, &f->opt, &a->solid, &a->spline, &a->value_range);
+  } else {
+    st = need_carrier(f);
+    if (st >= 0)
+      st = batten_solid_fit_pairs(f->ctx, &f->data, f->normals, f->carrier, &f->opt, &a->solid, &a->spline,
+                                  &a->value_range);
+  }
+  a->status = st;
+  f->info.time_fit_s += batten_now() - start;
+  return st < 0 ? st : check_attempt(f, a);
+}
+
+/* ---- the cure ------------------------------------------------------------------------------------ */
+
+static size_t complaints(const batten_sign_check *c) {
+  return c->weak_gradients + c->flipped_neighbours + c->phantom_components + c->phantom_cells;
+}
+
+/* Errors that end the fit even where another way might be left. */
+static bool is_final(batten_status st) {
+  return st == BATTEN_E_NOMEM || st == BATTEN_E_CANCELLED || st == BATTEN_E_INTERNAL;
+}
+
+/* In one dimension the order of the points says it all: the ends of intervals, in turn. */
+static batten_status orient_on_line(fit_state *f) {
+  const surface_data *d = &f->data;
+  if (d->count % 2 != 0)
+    return batten_fail(f->ctx, BATTEN_E_INVALID, "points: %zu distinct ends of intervals; give an even number",
+                       d->count);
+  for (size_t i = 0; i < d->count; i++) {
+    size_t below = 0;
+    for (size_t j = 0; j < d->count; j++) below += d->points[j] < d->points[i];
+    f->normals[i] = below % 2 ? 1 : -1;
+  }
+  return BATTEN_OK;
+}
+
+static batten_status orient(fit_state *f) {
+  const surface_data *d = &f->data;
+  if (d->normals && f->opt.orientation != BATTEN_ORIENT_ESTIMATE) {
+    f->normals = d->normals;
+    f->orientation = BATTEN_ORIENTATION_GIVEN;
+    return BATTEN_OK;
+  }
+  double start = batten_now();
+  f->normals = batten_alloc_array(f->ctx, d->count, d->n * sizeof(double));
+  if (!f->normals) return BATTEN_E_NOMEM;
+  batten_status st =
+      d->n == 1 ? orient_on_line(f)
+                : batten_orient(f->ctx, d->n, d->count, d->points, f->opt.orient_method, f->opt.energy_points,
+                                f->normals, &f->info.orient_method, &f->info.orient_lambda);
+  f->info.time_orient_s += batten_now() - start;
+  if (st >= 0) f->orientation = BATTEN_ORIENTATION_ESTIMATED;
+  return st;
+}
+
+/* Gradients for up to so many points: their system is n + 1 times as large. */
+enum { GRADIENT_POINTS = 2000 };
+
+/* Fits with orientation, the other kind of data too when the first is not clean and the caller left the choice. Keeps
+ * what has the fewest complaints; a cure that fails leaves the first fit. */
+static batten_status cure(fit_state *f) {
+  batten_orient_data kinds[2] = {f->opt.orient_data, f->opt.orient_data};
+  if (f->opt.orient_data == BATTEN_ORIENT_DATA_AUTO) {
+    bool small = f->data.count <= GRADIENT_POINTS || f->data.n == 1;
+    kinds[0] = small ? BATTEN_ORIENT_DATA_GRADIENTS : BATTEN_ORIENT_DATA_PAIRS;
+    kinds[1] = small ? BATTEN_ORIENT_DATA_PAIRS : BATTEN_ORIENT_DATA_GRADIENTS;
+  }
+  batten_status st = orient(f);
+  for (int k = 0; st >= 0 && k < 2 && !f->best.check.clean; k++) {
+    if (k == 1 && kinds[1] == kinds[0]) break;
+    attempt next = {0};
+    st = try_oriented(f, kinds[k], &next);
+    if (st >= 0 && (!f->best.solid || complaints(&next.check) < complaints(&f->best.check))) {
+      batten_solid_free(f->best.solid);
+      f->best = next;
+      next.solid = NULL;
+    }
+    batten_solid_free(next.solid);
+    if (st < 0 && k == 0 && kinds[1] != kinds[0] && !is_final(st)) st = BATTEN_OK; /* the other kind may do */
+  }
+  if (st < 0 && f->best.solid && !is_final(st)) st = BATTEN_OK;
+  if (st >= 0 && !f->best.solid) st = BATTEN_E_SINGULAR; /* the text is the last failure's */
+  return st;
+}
+
+/* ---- the report ---------------------------------------------------------------------------------- */
+
+static batten_status measure_residual(fit_state *f) {
+  const surface_data *d = &f->data;
+  size_t n = d->n;
+  double *values = batten_alloc_array(f->ctx, d->count, (n + 1) * sizeof *values);
+  if (!values) return BATTEN_E_NOMEM;
+  double *gradients = values + d->count;
+  batten_status st = batten_solid_evaluate(f->ctx, f->best.solid, d->count, d->points, values, gradients, NULL);
+  for (size_t i = 0; st >= 0 && i < d->count; i++) {
+    double square = 0;
+    for (size_t k = 0; k < n; k++) square += gradients[i * n + k] * gradients[i * n + k];
+    f->info.residual_max = fmax(f->info.residual_max, fabs(values[i]) / f->best.value_range);
+    if (values[i] != 0) f->info.distance_max = fmax(f->info.distance_max, fabs(values[i]) / sqrt(square));
+  }
+  batten_free(f->ctx, values);
+  return st;
+}
+
+static batten_status ambiguous(const fit_state *f) {
+  const batten_sign_check *c = &f->best.check;
+  return batten_fail(
+      f->ctx, BATTEN_W_AMBIGUOUS,
+      "points: the sign is not settled: of %zu points %zu do not separate inside from outside, %zu pairs "
+      "of neighbours contradict each other, %zu pieces of f = 0 without data, %zu cells of f = 0 far "
+      "from data; %s",
+      f->data.count, c->weak_gradients, c->flipped_neighbours, c->phantom_components, c->phantom_cells,
+      f->orientation == BATTEN_ORIENTATION_GIVEN ? "check that opt.normals point outwards"
+                                                 : "give opt.normals, or more points where it is thin");
+}
+
+static batten_status finish(fit_state *f) {
+  batten_status st = measure_residual(f);
+  if (st < 0) return st;
+  batten_solid_info *info = &f->info;
+  bool oriented = f->best.data != BATTEN_ORIENT_DATA_AUTO;
+  info->points_given = f->data.given;
+  info->points_used = f->data.count;
+  info->duplicates_merged = f->data.given - f->data.count;
+  info->orientation = oriented ? f->orientation : BATTEN_ORIENTATION_NONE;
+  info->orient_data = f->best.data;
+  info->check_final = f->best.check;
+  info->spline = f->best.spline;
+  info->spacing = f->data.spacing_median;
+  info->sign = !f->best.check.clean ? BATTEN_SIGN_AMBIGUOUS
+               : !info->check.clean ? BATTEN_SIGN_CURED
+                                    : BATTEN_SIGN_CLEAN;
+  return f->best.check.clean ? f->best.status : ambiguous(f);
+}
+
+/* Whether to start from oriented data without asking the carrier. */
+static bool orientation_comes_first(const fit_state *f) {
+  const batten_solid_options *o = &f->opt;
+  if (f->data.n == 1 || o->orientation == BATTEN_ORIENT_GIVEN || o->orientation == BATTEN_ORIENT_ESTIMATE)
+    return true;
+  if (o->orientation == BATTEN_ORIENT_NEVER) return false;
+  /* AUTO: what the carrier cannot do, and nobody asked it to do by name, or normals are there */
+  bool reproduced = o->carrier ? kind_is_reproduced(o->carrier, o->spline.m) : o->spline.m >= 3;
+  return reproduced && (!o->carrier || f->data.normals);
+}
+
+static void release(fit_state *f) {
+  if (f->normals != f->data.normals) batten_free(f->ctx, f->normals);
+  batten_solid_free(f->best.solid);
+  batten_carrier_free(f->carrier);
+  batten_surface_data_free(f->ctx, &f->data);
+}
+
+/* opt->carrier is const for the caller; sharing it only counts owners. */
+static batten_carrier *share(const batten_carrier *c) {
+  return batten_carrier_retain((batten_carrier *)(uintptr_t)c);
+}
+
+batten_status batten_solid_fit(batten_context *ctx, unsigned n, size_t count, const double *points,
+                               const batten_solid_options *opt, batten_solid **out, batten_solid_info *info) {
+  fit_state f = {.ctx = ctx, .opt = opt ? *opt : batten_solid_options_default()};
+  batten_status st = check_arguments(ctx, n, count, points, out);
+  if (st >= 0) st = check_options(ctx, n, &f.opt);
+  if (st < 0) return st;
+  f.carrier = share(f.opt.carrier);
+  st = batten_surface_data_make(ctx, n, count, points, &f.opt, &f.data);
+  if (st < 0) goto done;
+  if (orientation_comes_first(&f)) {
+    st = cure(&f);
+    if (st >= 0) f.info.check = f.best.check;
+  } else {
+    st = try_carrier(&f, &f.best);
+    if (st >= 0) f.info.check = f.best.check;
+    if (st >= 0 && !f.best.check.clean && f.opt.orientation == BATTEN_ORIENT_AUTO) st = cure(&f);
+  }
+  if (st >= 0) st = finish(&f);
+  if (st < 0) goto done;
+  *out = f.best.solid;
+  f.best.solid = NULL;
+  if (info) *info = f.info;
+done:
+  release(&f);
+  return st;
+}

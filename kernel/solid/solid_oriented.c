@@ -1,0 +1,243 @@
+/* Fits in which outward unit normals v_i are data, and what holds the field down far away.
+ *
+ *   gradients   U(x_i) = 0, grad U(x_i) = v_i, no carrier: f = -U falls with slope 1 through every point. The kernel
+ *               is the smoothest step above the caller's m that has two derivatives to spare (r^3, r^4 ln r).
+ *   pairs       the points x_i +- h_i v_i get f = -+ c h_i, so U = f_c +- c h_i there; c is the carrier's own slope,
+ * so that the pairs and the carrier agree on what steep means, whatever the unit of length.
+ *
+ * Oriented data alone say nothing about far away, where both fits can turn positive: a few points on a sphere of
+ * twice the data's size take minus the distance to the data. A pair is shortened, in the end dropped, where it would
+ * come nearer to another point of the surface than to its own: thin parts, tight concavities. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/checked.h"
+#include "solid/solid_inner.h"
+
+enum { HALVINGS = 3 };
+
+/* The data of an oriented fit while it is put together: surface points first. */
+typedef struct collection {
+  unsigned n;
+  size_t count, capacity;
+  double *points, *values, *smoothing; /* smoothing NULL = the same for all */
+} collection;
+
+static batten_status open_collection(batten_context *ctx, const surface_data *d, size_t capacity, collection *c) {
+  *c = (collection){.n = d->n, .capacity = capacity};
+  c->points = batten_alloc_array(ctx, capacity, d->n * sizeof(double));
+  c->values = batten_alloc_array(ctx, capacity, sizeof(double));
+  if (!c->points || !c->values) return BATTEN_E_NOMEM;
+  if (!d->smoothing) return BATTEN_OK;
+  c->smoothing = batten_alloc_array(ctx, capacity, sizeof(double));
+  return c->smoothing ? BATTEN_OK : BATTEN_E_NOMEM;
+}
+
+static void close_collection(batten_context *ctx, collection *c) {
+  batten_free(ctx, c->points);
+  batten_free(ctx, c->values);
+  batten_free(ctx, c->smoothing);
+}
+
+static void add(collection *c, const double *x, double value, double smoothing) {
+  memcpy(c->points + c->count * c->n, x, c->n * sizeof *x);
+  c->values[c->count] = value;
+  if (c->smoothing) c->smoothing[c->count] = smoothing;
+  c->count++;
+}
+
+static void add_surface(collection *c, const surface_data *d) {
+  for (size_t i = 0; i < d->count; i++) add(c, d->points + i * d->n, 0, d->smoothing ? d->smoothing[i] : 0);
+}
+
+/* ---- far away ------------------------------------------------------------------------------------ */
+
+/* Enough that no direction is more than about 30 degrees from one of them. In one dimension the slopes suffice. */
+static size_t far_count(unsigned n) { return n == 3 ? 32 : n == 2 ? 16 : 0; }
+
+static void add_far(collection *c, const surface_data *d, double slope) {
+  size_t of = far_count(d->n);
+  for (size_t i = 0; i < of; i++) {
+    double z = d->n == 3 ? 1 - (2.0 * (double)i + 1) / (double)of : 0, r = sqrt(1 - z * z);
+    double angle = d->n == 3 ? 2.399963229728653 * (double)i : 2 * 3.141592653589793 * (double)i / (double)of;
+    double v[3] = {r * cos(angle), r * sin(angle), z}, x[3], distance;
+    size_t nearest;
+    for (unsigned k = 0; k < d->n; k++) x[k] = d->middle[k] + 2 * d->radius * v[k];
+    batten_tree_nearest(d->tree, x, 1, SIZE_MAX, &nearest, &distance);
+    add(c, x, -slope * distance, 0);
+  }
+}
+
+static double range_of(size_t count, const double *values) {
+  double least = INFINITY, most = -INFINITY;
+  for (size_t i = 0; i < count; i++) {
+    least = fmin(least, values[i]);
+    most = fmax(most, values[i]);
+  }
+  return most - least;
+}
+
+static batten_spline_options spline_options(const batten_solid_options *opt, const collection *c) {
+  batten_spline_options o = opt->spline;
+  o.smoothing_per_point = c->smoothing;
+  return o;
+}
+
+/* ---- gradients ----------------------------------------------------------------------------------- */
+
+batten_status batten_solid_fit_gradients(batten_context *ctx, const surface_data *d, const double *normals,
+                                         const batten_solid_options *opt, batten_solid **out,
+                                         batten_spline_info *info, double *value_range) {
+  collection c;
+  batten_spline *spline = NULL;
+  batten_carrier *none = NULL;
+  batten_status st = open_collection(ctx, d, d->count + far_count(d->n), &c), fitted;
+  if (st < 0) goto done;
+  add_surface(&c, d);
+  add_far(&c, d, 1);
+  for (size_t i = 0; i < c.count; i++) c.values[i] = -c.values[i]; /* U = -f */
+  batten_spline_options o = spline_options(opt, &c);
+  while (2 * o.m - d->n <= 2) o.m++;
+  batten_spline_data data = batten_spline_data_default();
+  data.n = d->n;
+  data.count = c.count;
+  data.points = c.points;
+  data.values = c.values;
+  data.gradient_count = d->count;
+  data.gradients = normals;
+  st = fitted = batten_spline_fit(ctx, &data, &o, &spline, info);
+  if (st >= 0) st = batten_carrier_none(ctx, d->n, &none);
+  if (st >= 0) st = batten_solid_new(ctx, spline, none, 1, d->count, d->points, d->lower, d->upper, out);
+  if (st >= 0) {
+    *value_range = fmax(range_of(c.count, c.values), d->radius);
+    st = fitted;
+  }
+done:
+  batten_spline_free(spline);
+  batten_carrier_free(none);
+  close_collection(ctx, &c);
+  return st;
+}
+
+/* ---- pairs --------------------------------------------------------------------------------------- */
+
+/* x = point i + h side normal with the longest h that keeps x nearest to its own point; 0 when there is none. */
+static double place_pair(const surface_data *d, const double *normals, size_t i, int side, double h, double *x) {
+  for (int halving = 0; halving <= HALVINGS; halving++, h /= 2) {
+    size_t nearest;
+    double distance;
+    for (unsigned k = 0; k < d->n; k++) x[k] = d->points[i * d->n + k] + side * h * normals[i * d->n + k];
+    batten_tree_nearest(d->tree, x, 1, SIZE_MAX, &nearest, &distance);
+    if (nearest == i) return h;
+  }
+  return 0;
+}
+
+/* Drops points off the surface, from `first` on, that come nearer to an earlier one than a tenth of their height:
+ * both sides of something thin meet in its middle. */
+static batten_status drop_meeting(batten_context *ctx, collection *c, size_t first) {
+  size_t n = c->n, count = c->count - first, kept = first;
+  batten_tree *tree = NULL;
+  size_t *near = batten_alloc_array(ctx, count, sizeof *near);
+  unsigned char *gone = batten_alloc_array(ctx, count, 1);
+  batten_status st = near && gone ? batten_tree_new(ctx, c->n, count, c->points + first * n, &tree) : BATTEN_E_NOMEM;
+  if (st < 0) goto done;
+  for (size_t i = 0; i < count; i++) {
+    const double *x = c->points + (first + i) * n;
+    size_t found = batten_tree_within(tree, x, 0.1 * fabs(c->values[first + i]), near);
+    gone[i] = 0;
+    for (size_t j = 0; j < found; j++) gone[i] = gone[i] || (near[j] < i && !gone[near[j]]);
+  }
+  for (size_t i = 0; i < count; i++) {
+    if (gone[i]) continue;
+    memmove(c->points + kept * n, c->points + (first + i) * n, n * sizeof(double));
+    c->values[kept] = c->values[first + i];
+    if (c->smoothing) c->smoothing[kept] = c->smoothing[first + i];
+    kept++;
+  }
+  c->count = kept;
+done:
+  batten_tree_free(ctx, tree);
+  batten_free(ctx, near);
+  batten_free(ctx, gone);
+  return st;
+}
+
+static int compare_doubles(const void *a, const void *b) {
+  double x = *(const double *)a, y = *(const double *)b;
+  return (x > y) - (x < y);
+}
+
+/* Median of |grad f_c| at the points, 1 where the carrier is flat. */
+static batten_status slope_of(batten_context *ctx, const batten_carrier *carrier, const surface_data *d,
+                              double *slope) {
+  size_t n = d->n;
+  double *gradients = batten_alloc_array(ctx, d->count, n * sizeof *gradients);
+  double *lengths = batten_alloc_array(ctx, d->count, sizeof *lengths);
+  batten_status st = gradients && lengths ? BATTEN_OK : BATTEN_E_NOMEM;
+  if (st >= 0) st = batten_carrier_evaluate(ctx, carrier, d->count, d->points, NULL, gradients, NULL);
+  if (st < 0) goto done;
+  for (size_t i = 0; i < d->count; i++) {
+    double square = 0;
+    for (size_t k = 0; k < n; k++) square += gradients[i * n + k] * gradients[i * n + k];
+    lengths[i] = sqrt(square);
+  }
+  qsort(lengths, d->count, sizeof *lengths, compare_doubles);
+  *slope = lengths[d->count / 2] > 0 ? lengths[d->count / 2] : 1;
+done:
+  batten_free(ctx, gradients);
+  batten_free(ctx, lengths);
+  return st;
+}
+
+/* Surface points, pairs and far points with the values of f, heights not yet multiplied by the slope. */
+static batten_status collect_pairs(batten_context *ctx, const surface_data *d, const double *normals,
+                                   double pair_distance, collection *c) {
+  add_surface(c, d);
+  for (size_t i = 0; i < d->count; i++)
+    for (int side = 1; side >= -1; side -= 2) {
+      double x[3], h = place_pair(d, normals, i, side, pair_distance * d->spacing[i], x);
+      if (h > 0) add(c, x, -side * h, d->smoothing ? d->smoothing[i] : 0);
+    }
+  batten_status st = drop_meeting(ctx, c, d->count);
+  add_far(c, d, 1);
+  return st;
+}
+
+batten_status batten_solid_fit_pairs(batten_context *ctx, const surface_data *d, const double *normals,
+                                     batten_carrier *carrier, const batten_solid_options *opt, batten_solid **out,
+                                     batten_spline_info *info, double *value_range) {
+  collection c = {0};
+  batten_spline *spline = NULL;
+  double *of_carrier = NULL, slope = 1;
+  size_t capacity;
+  batten_status st = BATTEN_E_NOMEM, fitted;
+  if (!batten_mul(d->count, 3, &capacity) || !batten_add(capacity, far_count(d->n), &capacity))
+    return batten_fail(ctx, BATTEN_E_TOO_LARGE, "count: %zu points with pairs; give fewer", d->count);
+  st = open_collection(ctx, d, capacity, &c);
+  if (st >= 0) st = collect_pairs(ctx, d, normals, opt->pair_distance, &c);
+  if (st >= 0) st = slope_of(ctx, carrier, d, &slope);
+  if (st < 0) goto done;
+  of_carrier = batten_alloc_array(ctx, c.count, sizeof *of_carrier);
+  st = of_carrier ? batten_carrier_evaluate(ctx, carrier, c.count, c.points, of_carrier, NULL, NULL) : BATTEN_E_NOMEM;
+  if (st < 0) goto done;
+  for (size_t i = 0; i < c.count; i++) c.values[i] = of_carrier[i] - slope * c.values[i]; /* U = f_c - f */
+  batten_spline_options o = spline_options(opt, &c);
+  batten_spline_data data = batten_spline_data_default();
+  data.n = d->n;
+  data.count = c.count;
+  data.points = c.points;
+  data.values = c.values;
+  st = fitted = batten_spline_fit(ctx, &data, &o, &spline, info);
+  if (st >= 0) st = batten_solid_new(ctx, spline, carrier, 1, d->count, d->points, d->lower, d->upper, out);
+  if (st >= 0) {
+    *value_range = range_of(c.count, c.values);
+    st = fitted;
+  }
+done:
+  batten_spline_free(spline);
+  batten_free(ctx, of_carrier);
+  close_collection(ctx, &c);
+  return st;
+}
