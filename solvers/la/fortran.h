@@ -52,6 +52,8 @@ BATTEN_DECLARE_REAL(s, float)
 #undef BATTEN_DECLARE_REAL
 
 /* LAPACK in double. */
+void FORTRAN(dpstrf)(CH uplo, IN n, double *a, IN lda, OUT piv, OUT rank, const double *tol, double *work, OUT info,
+                     LEN);
 void FORTRAN(dsytrf)(CH uplo, IN n, double *a, IN lda, OUT ipiv, double *work, IN lwork, OUT info, LEN);
 void FORTRAN(dsytrs)(CH uplo, IN n, IN nrhs, const double *a, IN lda, IN ipiv, double *b, IN ldb, OUT info, LEN);
 void FORTRAN(dsycon)(CH uplo, IN n, const double *a, IN lda, IN ipiv, const double *anorm, double *rcond,

@@ -128,6 +128,27 @@ void batten_la_pftrs(batten_la_real real, size_t n, size_t nrhs, const void *a, 
   assert(info == 0);
 }
 
+batten_status batten_la_pstrf(batten_context *ctx, size_t n, double *a, size_t lda, size_t *pivots, size_t *rank) {
+  *rank = 0;
+  if (n == 0) return BATTEN_OK;
+  batten_status st = BATTEN_E_NOMEM;
+  double *work = NULL;
+  batten_la_int *piv = batten_alloc_array(ctx, n, sizeof *piv);
+  if (!piv) goto done;
+  work = batten_alloc_array(ctx, n, 2 * sizeof *work);
+  if (!work) goto done;
+  batten_la_int ni = to_int(n), la = to_ld(lda), r = 0, info = 0;
+  const double default_tolerance = -1;
+  FORTRAN(dpstrf)("U", &ni, a, &la, piv, &r, &default_tolerance, work, &info, 1);
+  for (size_t j = 0; j < n; j++) pivots[j] = (size_t)piv[j] - 1;
+  *rank = (size_t)r;
+  st = info < 0 ? illegal(ctx, "dpstrf", info) : BATTEN_OK; /* info 1: rank below n, no error here */
+done:
+  batten_free(ctx, work);
+  batten_free(ctx, piv);
+  return st;
+}
+
 /* ---- Bunch-Kaufman ---- */
 
 size_t batten_la_sytrf_work(size_t n) {

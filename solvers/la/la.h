@@ -47,6 +47,10 @@ size_t batten_la_potrf(batten_la_real real, char uplo, size_t n, void *a, size_t
 size_t batten_la_pftrf(batten_la_real real, size_t n, void *a);
 void batten_la_pftrs(batten_la_real real, size_t n, size_t nrhs, const void *a, void *b, size_t ldb);
 
+/* Cholesky with diagonal pivoting of a semidefinite matrix, upper triangle: P'AP = U'U with *rank rows of U, column j
+ * of AP being column pivots[j] of A. Stops where the diagonal left is below n eps times the largest. */
+batten_status batten_la_pstrf(batten_context *ctx, size_t n, double *a, size_t lda, size_t *pivots, size_t *rank);
+
 /* Bunch-Kaufman of the lower triangle. SINGULAR: D has an exact zero, *zero is its 0-based place, the factor is
  * complete otherwise. */
 size_t batten_la_sytrf_work(size_t n);

@@ -316,7 +316,7 @@ batten_status batten_saddle_solve(batten_context *ctx, batten_saddle *s, const d
     st = factor_from(s, next_method(s->info.method));
   }
   if (st < 0) goto done;
-  memcpy(w, best, n * sizeof *w);
+  if (n > 0) memcpy(w, best, n * sizeof *w);
   if (k > 0) memcpy(c, best + n, k * sizeof *c);
   s->info.time_solve_s = batten_now() - start;
   if (s->info.residual > s->options.residual_tol)

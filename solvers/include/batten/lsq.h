@@ -1,4 +1,4 @@
-/* Dense linear least squares: minimise |A X - B|_2 column by column, A [m][n] of full column rank. */
+/* Dense linear least squares: minimise sum_i w_i ((A x - b)_i)^2 + x'T x for each right side, [A; T] of full rank. */
 #ifndef BATTEN_LSQ_H
 #define BATTEN_LSQ_H
 
@@ -30,7 +30,7 @@ typedef struct batten_lsq_info {
   double time_s;
 } batten_lsq_info;
 
-/* m >= n >= 0, nrhs >= 0. a [m][n] and b [m][nrhs] row-major, only read; x [n][nrhs] row-major.
+/* n, nrhs >= 0; m >= n, or any m >= 0 with tension. a [m][n] and b [m][nrhs] row-major, only read; x [n][nrhs] row-major.
  * Fails: INVALID, TOO_LARGE, NOMEM, SINGULAR (rank; names the column), CANCELLED. info may be NULL. */
 BATTEN_API batten_status batten_lsq_solve(batten_context *ctx, size_t m, size_t n, size_t nrhs, const double *a,
                                           const double *b, const batten_lsq_options *opt, double *x,
