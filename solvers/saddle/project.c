@@ -255,7 +255,7 @@ size_t batten_saddle_project_bytes(batten_la_real real, size_t n, size_t k) {
   size_t norms = rest * (2 * sizeof(double) + sizeof(batten_la_int) + (size_t)real);
   size_t scratch = walk > projection ? walk : projection;
   if (norms > scratch) scratch = norms;
-  return batten_add(packed, head, &bytes) & batten_add(bytes, scratch, &bytes) ? bytes : SIZE_MAX;
+  return batten_add(packed, head, &bytes) && batten_add(bytes, scratch, &bytes) ? bytes : SIZE_MAX;
 }
 
 batten_status batten_saddle_project_factor(batten_saddle *s, batten_la_real real) {
