@@ -18,7 +18,6 @@ batten_solid_options batten_solid_options_default(void) {
 /* One way of fitting and what came of it. */
 typedef struct attempt {
   batten_solid *solid;
-  batten_status status; /* positive: from the spline */
   batten_spline_info spline;
   double value_range;
   batten_orient_data data; /* AUTO: the carrier alone */
@@ -154,7 +153,7 @@ static batten_status fit_with_carrier(fit_state *f, attempt *a) {
   batten_spline *spline = NULL;
   double *values = NULL, scale = 0, least = INFINITY, most = -INFINITY;
   bool reproduced = false;
-  batten_status st = need_carrier(f), fitted;
+  batten_status st = need_carrier(f);
   if (st < 0) return st;
   if (kind_is_reproduced(f->carrier, f->opt.spline.m)) return refuse_carrier(ctx, f->carrier, f->opt.spline.m);
   values = batten_alloc_array(ctx, d->count, sizeof *values);
@@ -167,7 +166,7 @@ static batten_status fit_with_carrier(fit_state *f, attempt *a) {
   data.values = values;
   batten_spline_options o = f->opt.spline;
   o.smoothing_per_point = d->smoothing;
-  st = fitted = batten_spline_fit(ctx, &data, &o, &spline, &a->spline);
+  st = batten_spline_fit(ctx, &data, &o, &spline, &a->spline);
   if (st >= 0) st = batten_solid_new(ctx, spline, f->carrier, 1, d->count, d->points, d->lower, d->upper, &a->solid);
   if (st >= 0) st = is_reproduced(f, a->solid, &reproduced, &scale);
   if (st >= 0 && reproduced) st = refuse_carrier(ctx, f->carrier, f->opt.spline.m);
@@ -178,7 +177,6 @@ static batten_status fit_with_carrier(fit_state *f, attempt *a) {
   }
   /* A carrier that passes through all points gives them equal values: then its own size is the measure. */
   a->value_range = most - least > 1e-6 * scale ? most - least : scale;
-  a->status = fitted;
 done:
   batten_spline_free(spline);
   batten_free(ctx, values);
@@ -212,7 +210,6 @@ static batten_status try_oriented(fit_state *f, batten_orient_data data, attempt
       st = batten_solid_fit_pairs(f->ctx, &f->data, f->normals, f->carrier, &f->opt, &a->solid, &a->spline,
                                   &a->value_range);
   }
-  a->status = st;
   f->info.time_fit_s += batten_now() - start;
   return st < 0 ? st : check_attempt(f, a);
 }
@@ -291,6 +288,9 @@ static batten_status cure(fit_state *f) {
   return st;
 }
 
+/* max |f| / range of the values above which the fit counts as inaccurate. */
+static const double RESIDUAL = 1e-10;
+
 /* ---- the report ---------------------------------------------------------------------------------- */
 
 static batten_status measure_residual(fit_state *f) {
@@ -338,7 +338,15 @@ static batten_status finish(fit_state *f) {
   info->sign = !f->best.check.clean ? BATTEN_SIGN_AMBIGUOUS
                : !info->check.clean ? BATTEN_SIGN_CURED
                                     : BATTEN_SIGN_CLEAN;
-  return f->best.check.clean ? f->best.status : ambiguous(f);
+  if (!f->best.check.clean) return ambiguous(f);
+  /* The saddle solver's tolerance is for its equations; here counts how near f comes to 0, or, where smoothing keeps
+   * it away, the spline to what it aims at. */
+  double miss = fmin(info->residual_max, info->spline.residual_max);
+  if (miss <= RESIDUAL) return BATTEN_OK;
+  return batten_fail(f->ctx, BATTEN_W_ACCURACY,
+                     "points: |f| is up to %.3g of the values' range; merge close points, or "
+                     "smooth",
+                     miss);
 }
 
 /* Whether to start from oriented data without asking the carrier. */

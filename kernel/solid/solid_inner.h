@@ -27,11 +27,12 @@ batten_status batten_solid_new(batten_context *ctx, batten_spline *spline, batte
 typedef struct surface_data {
   unsigned n;
   size_t given, count;
-  double *points;                               /* [count][n] */
-  double *normals;                              /* [count][n] unit, NULL = none given */
-  double *smoothing;                            /* [count], NULL = the same for all */
-  double *spacing;                              /* [count] local distance between neighbours on the surface */
-  double spacing_median;                        /* of the distances to the nearest */
+  double *points;        /* [count][n] */
+  double *normals;       /* [count][n] unit, NULL = none given */
+  double *smoothing;     /* [count], NULL = the same for all */
+  double *spacing;       /* [count] local distance between neighbours on the surface */
+  double *gap;           /* [count] >= spacing: how far the surface may go without data, about */
+  double spacing_median; /* of the distances to the nearest */
   double lower[3], upper[3], middle[3], radius; /* box, and the ball about it */
   batten_tree *tree;
 } surface_data;

@@ -53,19 +53,25 @@ static void add_surface(collection *c, const surface_data *d) {
 
 /* ---- far away ------------------------------------------------------------------------------------ */
 
-/* Enough that no direction is more than about 30 degrees from one of them. In one dimension the slopes suffice. */
-static size_t far_count(unsigned n) { return n == 3 ? 32 : n == 2 ? 16 : 0; }
+enum { SHELLS = 2 };
+static const double SHELL_RADII[SHELLS] = {2, 4}; /* in half diagonals of the data's box */
 
-static void add_far(collection *c, const surface_data *d, double slope) {
-  size_t of = far_count(d->n);
-  for (size_t i = 0; i < of; i++) {
-    double z = d->n == 3 ? 1 - (2.0 * (double)i + 1) / (double)of : 0, r = sqrt(1 - z * z);
-    double angle = d->n == 3 ? 2.399963229728653 * (double)i : 2 * 3.141592653589793 * (double)i / (double)of;
+/* Enough that no direction is more than about 30 degrees from one of them. In one dimension the slopes suffice. */
+static size_t far_directions(unsigned n) { return n == 3 ? 32 : n == 2 ? 16 : 0; }
+static size_t far_count(unsigned n) { return SHELLS * far_directions(n); }
+
+/* f falls a little faster than the distance grows: a spline that contains quadratics then goes on downwards. */
+static void add_far(collection *c, const surface_data *d) {
+  size_t of = far_directions(d->n);
+  for (size_t i = 0; i < SHELLS * of; i++) {
+    double at = (double)(i % of), radius = SHELL_RADII[i / of] * d->radius;
+    double z = d->n == 3 ? 1 - (2 * at + 1) / (double)of : 0, r = sqrt(1 - z * z);
+    double angle = d->n == 3 ? 2.399963229728653 * at : 2 * 3.141592653589793 * at / (double)of;
     double v[3] = {r * cos(angle), r * sin(angle), z}, x[3], distance;
     size_t nearest;
-    for (unsigned k = 0; k < d->n; k++) x[k] = d->middle[k] + 2 * d->radius * v[k];
+    for (unsigned k = 0; k < d->n; k++) x[k] = d->middle[k] + radius * v[k];
     batten_tree_nearest(d->tree, x, 1, SIZE_MAX, &nearest, &distance);
-    add(c, x, -slope * distance, 0);
+    add(c, x, -distance * (1 + distance / (2 * d->radius)), 0);
   }
 }
 
@@ -92,10 +98,10 @@ batten_status batten_solid_fit_gradients(batten_context *ctx, const surface_data
   collection c;
   batten_spline *spline = NULL;
   batten_carrier *none = NULL;
-  batten_status st = open_collection(ctx, d, d->count + far_count(d->n), &c), fitted;
+  batten_status st = open_collection(ctx, d, d->count + far_count(d->n), &c);
   if (st < 0) goto done;
   add_surface(&c, d);
-  add_far(&c, d, 1);
+  add_far(&c, d);
   for (size_t i = 0; i < c.count; i++) c.values[i] = -c.values[i]; /* U = -f */
   batten_spline_options o = spline_options(opt, &c);
   while (2 * o.m - d->n <= 2) o.m++;
@@ -106,13 +112,10 @@ batten_status batten_solid_fit_gradients(batten_context *ctx, const surface_data
   data.values = c.values;
   data.gradient_count = d->count;
   data.gradients = normals;
-  st = fitted = batten_spline_fit(ctx, &data, &o, &spline, info);
+  st = batten_spline_fit(ctx, &data, &o, &spline, info);
   if (st >= 0) st = batten_carrier_none(ctx, d->n, &none);
   if (st >= 0) st = batten_solid_new(ctx, spline, none, 1, d->count, d->points, d->lower, d->upper, out);
-  if (st >= 0) {
-    *value_range = fmax(range_of(c.count, c.values), d->radius);
-    st = fitted;
-  }
+  if (st >= 0) *value_range = fmax(range_of(c.count, c.values), d->radius);
 done:
   batten_spline_free(spline);
   batten_carrier_free(none);
@@ -191,7 +194,7 @@ done:
   return st;
 }
 
-/* Surface points, pairs and far points with the values of f, heights not yet multiplied by the slope. */
+/* Surface points and pairs with their heights, f over the slope. */
 static batten_status collect_pairs(batten_context *ctx, const surface_data *d, const double *normals,
                                    double pair_distance, collection *c) {
   add_surface(c, d);
@@ -200,9 +203,25 @@ static batten_status collect_pairs(batten_context *ctx, const surface_data *d, c
       double x[3], h = place_pair(d, normals, i, side, pair_distance * d->spacing[i], x);
       if (h > 0) add(c, x, -side * h, d->smoothing ? d->smoothing[i] : 0);
     }
-  batten_status st = drop_meeting(ctx, c, d->count);
-  add_far(c, d, 1);
-  return st;
+  return drop_meeting(ctx, c, d->count);
+}
+
+/* Turns the heights of f into the values of U = f_c - slope f. Far points, from first_far on, stay only where the
+ * carrier is not far down by itself: there U is better left to follow it (a quadratic carrier rises above a U that is
+ * tied down at a few places). */
+static void subtract_from_carrier(collection *c, size_t first_far, double slope, const double *of_carrier) {
+  size_t kept = first_far, n = c->n;
+  for (size_t i = 0; i < c->count; i++) {
+    double f = slope * c->values[i];
+    if (i < first_far) {
+      c->values[i] = of_carrier[i] - f;
+    } else if (of_carrier[i] > f / 4) {
+      memmove(c->points + kept * n, c->points + i * n, n * sizeof(double));
+      if (c->smoothing) c->smoothing[kept] = c->smoothing[i];
+      c->values[kept++] = of_carrier[i] - f;
+    }
+  }
+  c->count = kept;
 }
 
 batten_status batten_solid_fit_pairs(batten_context *ctx, const surface_data *d, const double *normals,
@@ -212,29 +231,28 @@ batten_status batten_solid_fit_pairs(batten_context *ctx, const surface_data *d,
   batten_spline *spline = NULL;
   double *of_carrier = NULL, slope = 1;
   size_t capacity;
-  batten_status st = BATTEN_E_NOMEM, fitted;
+  batten_status st = BATTEN_E_NOMEM;
   if (!batten_mul(d->count, 3, &capacity) || !batten_add(capacity, far_count(d->n), &capacity))
     return batten_fail(ctx, BATTEN_E_TOO_LARGE, "count: %zu points with pairs; give fewer", d->count);
   st = open_collection(ctx, d, capacity, &c);
   if (st >= 0) st = collect_pairs(ctx, d, normals, opt->pair_distance, &c);
   if (st >= 0) st = slope_of(ctx, carrier, d, &slope);
   if (st < 0) goto done;
+  size_t first_far = c.count;
+  add_far(&c, d);
   of_carrier = batten_alloc_array(ctx, c.count, sizeof *of_carrier);
   st = of_carrier ? batten_carrier_evaluate(ctx, carrier, c.count, c.points, of_carrier, NULL, NULL) : BATTEN_E_NOMEM;
   if (st < 0) goto done;
-  for (size_t i = 0; i < c.count; i++) c.values[i] = of_carrier[i] - slope * c.values[i]; /* U = f_c - f */
+  subtract_from_carrier(&c, first_far, slope, of_carrier);
   batten_spline_options o = spline_options(opt, &c);
   batten_spline_data data = batten_spline_data_default();
   data.n = d->n;
   data.count = c.count;
   data.points = c.points;
   data.values = c.values;
-  st = fitted = batten_spline_fit(ctx, &data, &o, &spline, info);
+  st = batten_spline_fit(ctx, &data, &o, &spline, info);
   if (st >= 0) st = batten_solid_new(ctx, spline, carrier, 1, d->count, d->points, d->lower, d->upper, out);
-  if (st >= 0) {
-    *value_range = range_of(c.count, c.values);
-    st = fitted;
-  }
+  if (st >= 0) *value_range = range_of(c.count, c.values);
 done:
   batten_spline_free(spline);
   batten_free(ctx, of_carrier);
