@@ -28,5 +28,7 @@ batten_status bx_check_pointers(batten_context *ctx, const char *path, const voi
 /* The readers behind the public calls, on any stream: what tests and fuzzers feed. */
 batten_status bx_read_points_from(bx_reader *r, bx_format format, unsigned n, batten_cloud *out);
 batten_status bx_read_mesh_from(bx_reader *r, bx_format format, batten_mesh **out);
+batten_status bx_load_solid_from(bx_reader *r, batten_solid **out);
+batten_status bx_load_carrier_from(bx_reader *r, batten_carrier **out);
 
 #endif

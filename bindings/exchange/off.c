@@ -41,7 +41,8 @@ static batten_status read_keyword(off *o, const char **at) {
     return bx_fail_line(o->r, "'%s' is not OFF, NOFF, COFF, STOFF or a mixture (three dimensions only)",
                         bx_quote(word, length, quote));
   const char *next = behind;
-  if (bx_word_is(word, bx_next_word(&next, &word), "BINARY"))
+  length = bx_next_word(&next, &word);
+  if (bx_word_is(word, length, "BINARY"))
     return bx_fail_line(o->r, "OFF BINARY is not read; save the file as text");
   *at = behind;
   return BATTEN_OK;
@@ -84,14 +85,26 @@ static batten_status read_face(off *o) {
   return st;
 }
 
+static batten_status read_head(off *o) {
+  const char *at = NULL;
+  batten_status st = next_content(o, "the word OFF", &at);
+  if (st == BATTEN_OK) st = read_keyword(o, &at);
+  if (st == BATTEN_OK && *bx_skip_blanks(at) == '\0') st = next_content(o, "the line of counts", &at);
+  return st == BATTEN_OK ? read_counts(o, at) : st;
+}
+
+batten_status bx_read_off_counts(bx_reader *r, int64_t *vertices, int64_t *faces) {
+  off o = {.r = r};
+  batten_status st = read_head(&o);
+  *vertices = o.vertices;
+  *faces = o.faces;
+  return st;
+}
+
 batten_status bx_read_off(bx_reader *r, bx_soup *soup) {
   off o = {.r = r, .soup = soup};
   soup->n = 3;
-  const char *at = NULL;
-  batten_status st = next_content(&o, "the word OFF", &at);
-  if (st == BATTEN_OK) st = read_keyword(&o, &at);
-  if (st == BATTEN_OK && *bx_skip_blanks(at) == '\0') st = next_content(&o, "the line of counts", &at);
-  if (st == BATTEN_OK) st = read_counts(&o, at);
+  batten_status st = read_head(&o);
   for (int64_t i = 0; st == BATTEN_OK && i < o.vertices; i++) st = read_vertex(&o);
   for (int64_t i = 0; st == BATTEN_OK && i < o.faces && soup->want_triangles; i++) st = read_face(&o);
   return st;

@@ -48,6 +48,8 @@ batten_status bx_read_text(bx_reader *r, bx_soup *soup, unsigned n); /* n = 0: a
 batten_status bx_read_ply(bx_reader *r, bx_soup *soup);
 batten_status bx_read_obj(bx_reader *r, bx_soup *soup);
 batten_status bx_read_off(bx_reader *r, bx_soup *soup);
+/* The head alone. */
+batten_status bx_read_off_counts(bx_reader *r, int64_t *vertices, int64_t *faces);
 batten_status bx_read_stl(bx_reader *r, bx_soup *soup);
 
 #endif

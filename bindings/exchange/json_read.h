@@ -1,0 +1,37 @@
+/* Checked reading of JSON values. Every error names the file and the place in it: "a.json: solid.lower[2]: ..." */
+#ifndef BATTEN_EXCHANGE_JSON_READ_H
+#define BATTEN_EXCHANGE_JSON_READ_H
+
+#include "stream.h"
+
+#include <jansson.h>
+
+typedef struct bx_json {
+  batten_context *ctx;
+  const char *path;
+  char place[192]; /* of the value in hand */
+} bx_json;
+
+/* Parses the whole stream; *out is released by json_decref. Jansson's memory is not the context's: it has one
+ * allocator for the whole process, which belongs to the host. */
+batten_status bx_json_parse(bx_reader *r, json_t **out);
+
+/* The place of a member or item, for as long as it is read: size_t mark = bx_enter(...); ... bx_leave(j, mark). */
+size_t bx_enter(bx_json *j, const char *key);
+size_t bx_enter_item(bx_json *j, size_t index);
+void bx_leave(bx_json *j, size_t mark);
+
+batten_status bx_json_fail(bx_json *j, const char *format, ...) BATTEN_PRINTF(2, 3);
+
+/* A member that must be there. */
+batten_status bx_get(bx_json *j, const json_t *object, const char *key, json_t **out);
+batten_status bx_get_text(bx_json *j, const json_t *object, const char *key, const char **out);
+batten_status bx_get_number(bx_json *j, const json_t *object, const char *key, double *out);
+batten_status bx_get_whole(bx_json *j, const json_t *object, const char *key, int64_t lower, int64_t upper,
+                           int64_t *out);
+/* [count] numbers into out. */
+batten_status bx_get_numbers(bx_json *j, const json_t *object, const char *key, size_t count, double *out);
+/* [*rows][width] numbers in memory of the context; width 0: plain numbers, [*rows]. */
+batten_status bx_get_rows(bx_json *j, const json_t *object, const char *key, size_t width, size_t *rows, double **out);
+
+#endif
