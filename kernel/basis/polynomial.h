@@ -12,7 +12,7 @@ enum {
 };
 
 typedef struct batten_polynomial {
-  unsigned n, count;
+  unsigned n, degree, count;
   unsigned char exponent[BATTEN_POLYNOMIAL_MAX][3];
 } batten_polynomial;
 

@@ -276,6 +276,7 @@ static batten_status judge(const fit *t) {
 
 batten_status batten_spline_fit(batten_context *ctx, const batten_spline_data *data, const batten_spline_options *opt,
                                 batten_spline **out, batten_spline_info *info) {
+  if (!ctx) return BATTEN_E_INVALID;
   if (!data || !out) return batten_fail(ctx, BATTEN_E_INVALID, "%s: NULL", data ? "out" : "data");
   const double start = batten_now();
   fit t = {.ctx = ctx, .data = data, .opt = opt ? *opt : batten_spline_options_default()};

@@ -107,6 +107,7 @@ static void make_terms(batten_spline *s, double *to) {
 }
 
 batten_status batten_spline_create(batten_context *ctx, const batten_spline_parts *parts, batten_spline **out) {
+  if (!ctx) return BATTEN_E_INVALID;
   if (!parts || !out) return batten_fail(ctx, BATTEN_E_INVALID, "%s: NULL", parts ? "out" : "parts");
   batten_status st = check_parts(ctx, parts);
   if (st < 0) return st;
@@ -208,6 +209,8 @@ static void evaluate_task(void *arg, size_t index) {
 
 batten_status batten_spline_evaluate(batten_context *ctx, const batten_spline *s, size_t count, const double *points,
                                      double *values, double *gradients, double *hessians) {
+  if (!ctx) return BATTEN_E_INVALID;
+  if (!s) return batten_fail(ctx, BATTEN_E_INVALID, "s: NULL; make it with batten_spline_fit() or _create()");
   if (count && !points) return batten_fail(ctx, BATTEN_E_INVALID, "points: NULL with count = %zu", count);
   evaluation e = {.spline = s,
                   .sum = batten_spline_code()->sum,

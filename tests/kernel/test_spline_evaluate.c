@@ -308,6 +308,9 @@ static void test_edges(batten_context *ctx) {
   T_OK(batten_spline_evaluate(ctx, s, 0, NULL, NULL, NULL, NULL), ctx);
   T_OK(batten_spline_evaluate(ctx, s, 3, x, NULL, NULL, NULL), ctx);
   T_STATUS(batten_spline_evaluate(ctx, s, 3, NULL, v, NULL, NULL), BATTEN_E_INVALID, ctx, "points: NULL");
+  T_STATUS(batten_spline_evaluate(ctx, NULL, 3, x, v, NULL, NULL), BATTEN_E_INVALID, ctx, "s: NULL");
+  T_CHECK(batten_spline_evaluate(NULL, s, 3, x, v, NULL, NULL) == BATTEN_E_INVALID &&
+              batten_spline_create(NULL, &p, &s) == BATTEN_E_INVALID, "no context is refused");
   batten_field f = batten_spline_field(s);
   T_OK(f.evaluate(f.user, ctx, 1, x, v, NULL, NULL), ctx);
   T_CHECK(f.dimension == 3 && f.order == 2 && v[0] == 5, "as a field");
