@@ -8,6 +8,7 @@
 #include "improve.h"
 
 #include "base/checked.h"
+#include "project.h"
 #include "vec.h"
 
 #include <string.h>
@@ -173,8 +174,8 @@ static void flip_sweeps(improver *im) {
 
 /* Takes the coordinates out of d that a vertex on the box must keep. */
 static void keep_on_faces(unsigned char faces, double *d) {
-  for (int k = 0; k < 3; k++)
-    if (faces >> 2 * k & 3) d[k] = 0;
+  for (unsigned k = 0; k < 3; k++)
+    if (batten_on_face(faces, k)) d[k] = 0;
 }
 
 /* Where v should go along the surface: towards the mean of its neighbours; on the box, of its two neighbours there. */
@@ -198,25 +199,6 @@ static void smooth_target(const improver *im, uint32_t v, double *x) {
   double off = vec_dot(d, n);
   if (s->faces[v] && (s->faces[v] & (s->faces[v] - 1))) return; /* on an edge of the box: only the surface decides */
   for (int k = 0; k < 3; k++) x[k] += d[k] - off * n[k];
-}
-
-/* Newton step from x, at most `limit` long, within the faces of the box: x moves; n (may be NULL) gets the outward
- * direction. Returns |f| / |grad f|, INFINITY where the gradient gives none. */
-static double newton(double f, const double *gradient, unsigned char faces, double limit, double *x, double *n) {
-  double u[3], length, d[3];
-  memcpy(u, gradient, sizeof u);
-  if (n && vec_normalize(u))
-    for (int k = 0; k < 3; k++) n[k] = -u[k];
-  memcpy(u, gradient, sizeof u);
-  keep_on_faces(faces, u);
-  memcpy(d, u, sizeof d);
-  if (!vec_normalize(d)) return f == 0 ? 0 : INFINITY;
-  length = vec_dot(u, d);
-  double step = -f / length;
-  if (!(step < limit)) step = limit;
-  if (!(step > -limit)) step = -limit;
-  for (int k = 0; k < 3; k++) x[k] += step * d[k];
-  return fabs(f) / length;
 }
 
 static batten_status make_room(improver *im) {
@@ -247,7 +229,7 @@ static batten_status smooth(improver *im) {
   for (uint32_t v = 0; v < s->vertex_count; v++) {
     double *x = im->target + 3 * (size_t)v, n[3];
     memcpy(n, normal(s, v), sizeof n);
-    newton(im->values[v], im->gradients + 3 * (size_t)v, s->faces[v], STEP_MAX * im->edge, x, n);
+    batten_newton_step(3, im->values[v], im->gradients + 3 * (size_t)v, s->faces[v], STEP_MAX * im->edge, x, n);
     for (int attempt = 0; attempt < 3; attempt++) { /* all of the way, half, a quarter */
       if (ring_allows(im, v, MESH_NONE, x, n)) {
         memcpy(point(s, v), x, sizeof n);
@@ -281,48 +263,14 @@ batten_status batten_surface_improve(batten_surface *s, batten_sampler *sampler,
 
 /* ---- settling on f = 0 -------------------------------------------------------------------------- */
 
-enum { NEWTON_ROUNDS = 8 };
-
 batten_status batten_surface_settle(batten_surface *s, batten_sampler *sampler, double edge, double tolerance,
                                     double *distance_max) {
-  batten_context *ctx = s->ctx;
-  size_t count = s->vertex_count, active = count;
-  double worst = 0;
-  batten_status st = BATTEN_E_NOMEM;
-  double *values = NULL, *gradients = NULL, *x = NULL;
-  uint32_t *list = batten_alloc_array(ctx, count, sizeof *list);
-  if (!list || !(values = batten_alloc_array(ctx, count, sizeof *values)) ||
-      !(gradients = batten_alloc_array(ctx, count, 3 * sizeof *gradients)) ||
-      !(x = batten_alloc_array(ctx, count, 3 * sizeof *x)))
-    goto done;
-  for (uint32_t v = 0; v < count; v++) list[v] = v;
-  for (int round = 0; active > 0 && round <= NEWTON_ROUNDS; round++) {
-    st = batten_progress(ctx, "settle", (double)round / (NEWTON_ROUNDS + 1));
-    if (st < 0) goto done;
-    for (size_t i = 0; i < active; i++) memcpy(x + 3 * i, point(s, list[i]), 3 * sizeof *x);
-    st = batten_sampler_gradients(sampler, active, x, values, gradients);
-    if (st < 0) goto done;
-    size_t left = 0;
-    for (size_t i = 0; i < active; i++) {
-      uint32_t v = list[i];
-      double g[3];
-      memcpy(g, gradients + 3 * i, sizeof g);
-      double distance = newton(values[i], g, s->faces[v], STEP_MAX * edge, x + 3 * i, normal(s, v));
-      if (distance <= tolerance || round == NEWTON_ROUNDS) {
-        worst = fmax(worst, distance);
-      } else {
-        memcpy(point(s, v), x + 3 * i, sizeof g);
-        list[left++] = v;
-      }
-    }
-    active = left;
-  }
-  *distance_max = worst;
-  st = BATTEN_OK;
-done:
-  batten_free(ctx, x);
-  batten_free(ctx, gradients);
-  batten_free(ctx, values);
-  batten_free(ctx, list);
+  double *distance = batten_alloc_array(s->ctx, s->vertex_count, sizeof *distance), worst = 0;
+  if (!distance) return BATTEN_E_NOMEM;
+  batten_status st = batten_project_points(sampler, s->vertex_count, s->points, s->faces, edge, tolerance, s->normals,
+                                           distance);
+  for (size_t v = 0; st >= 0 && v < s->vertex_count; v++) worst = fmax(worst, distance[v]);
+  if (st >= 0) *distance_max = worst;
+  batten_free(s->ctx, distance);
   return st;
 }

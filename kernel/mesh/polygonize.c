@@ -14,7 +14,6 @@ static const double BOX_MARGIN = 0.25;                      /* of the seeds' lar
 static const double CELL_SPACING = 0.7;                     /* of the median distance between neighbouring seeds */
 static const double CELL_LARGEST = 1.0 / 30, CELL_SMALLEST = 1.0 / 200; /* of the diagonal of the seeds' box */
 static const double CUBE_EDGES = 1.5; /* lattice cubes are wider than the edges: they give 2.5 vertices for each */
-static const double DIFFERENCE = 1e-4; /* half step of differences, in edges: error about 1e-8 on smooth fields */
 
 batten_polygonize_options batten_polygonize_options_default(void) {
   return (batten_polygonize_options){
@@ -152,7 +151,7 @@ batten_status batten_polygonize_frame(batten_context *ctx, unsigned n, const bat
 
 /* ---- the phases --------------------------------------------------------------------------------- */
 
-static batten_status warn(batten_context *ctx, const batten_polygonize_info *info, double tolerance) {
+batten_status batten_polygonize_warn(batten_context *ctx, const batten_polygonize_info *info, double tolerance) {
   if (info->distance_max > tolerance)
     return batten_fail(ctx, BATTEN_W_ACCURACY,
                        "accuracy: vertices lie up to %g off f = 0, %g allowed; the field may not be smooth there",
@@ -195,7 +194,7 @@ batten_status batten_polygonize(batten_context *ctx, const batten_field *field, 
   batten_polygonize_info found = {.cell = frame.cell};
   batten_surface surface = {.ctx = ctx};
   batten_sampler sampler = {.ctx = ctx, .field = field, .evaluations_max = o.evaluations_max,
-                            .difference = DIFFERENCE * frame.cell};
+                            .difference = BATTEN_DIFFERENCE * frame.cell};
   st = make_surface(&sampler, &frame, seed_count, seeds, &o, &surface, &found);
   found.evaluations = sampler.evaluations;
   if (st >= 0)
@@ -203,5 +202,5 @@ batten_status batten_polygonize(batten_context *ctx, const batten_field *field, 
   batten_surface_free(&surface);
   if (st < 0) return st;
   if (info) *info = found;
-  return warn(ctx, &found, o.accuracy * frame.diagonal);
+  return batten_polygonize_warn(ctx, &found, o.accuracy * frame.diagonal);
 }

@@ -15,4 +15,10 @@ batten_status batten_polygonize_frame(batten_context *ctx, unsigned n, const bat
                                       const double *seeds, const batten_polygonize_options *opt, const void *out,
                                       batten_frame *frame);
 
+/* BATTEN_W_ACCURACY, BATTEN_W_CLIPPED or BATTEN_OK, as info says. */
+batten_status batten_polygonize_warn(batten_context *ctx, const batten_polygonize_info *info, double tolerance);
+
+/* Half step of central differences, in cells: error about 1e-8 on smooth fields. */
+#define BATTEN_DIFFERENCE 1e-4
+
 #endif

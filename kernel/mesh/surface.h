@@ -18,7 +18,7 @@ typedef struct batten_surface {
   batten_context *ctx;
   size_t vertex_count, triangle_count;
   double *points, *normals; /* [V][3]; normals: unit, outward, 0 = not known */
-  unsigned char *faces;     /* [V] of the box, SURFACE_LOWER_X ... */
+  unsigned char *faces;     /* [V] of the box, see project.h */
   uint32_t *out;            /* [V] */
   uint32_t *origin, *twin;  /* [3 T] */
   size_t points_capacity, normals_capacity, faces_capacity, out_capacity, origin_capacity, twin_capacity;

@@ -18,6 +18,7 @@
 #include "track.h"
 
 #include "base/checked.h"
+#include "project.h"
 #include "table.h"
 
 #include <string.h>
@@ -327,8 +328,8 @@ static void place_vertex(const tracker *tr, uint32_t a, uint32_t b, double *x, u
   unpack(key_b, cb);
   for (int k = 0; k < 3; k++) {
     x[k] = ca[k] == cb[k] ? p[k] : p[k] + t * (q[k] - p[k]);
-    if (ca[k] == cb[k] && ca[k] == 0) *faces |= (unsigned char)(SURFACE_LOWER_X << 2 * k);
-    if (ca[k] == cb[k] && ca[k] == tr->limit[k]) *faces |= (unsigned char)(SURFACE_UPPER_X << 2 * k);
+    if (ca[k] == cb[k] && ca[k] == 0) *faces |= (unsigned char)(BATTEN_LOWER_FACE << 2 * k);
+    if (ca[k] == cb[k] && ca[k] == tr->limit[k]) *faces |= (unsigned char)(BATTEN_UPPER_FACE << 2 * k);
   }
 }
 

@@ -6,13 +6,10 @@
 
 #include <stdint.h>
 
-/* Faces of the clip box that a vertex lies on. */
-enum { SURFACE_LOWER_X = 1, SURFACE_UPPER_X = 2 }; /* shifted by 2 for y, by 4 for z */
-
 typedef struct batten_rough_surface {
   size_t vertex_count, triangle_count;
   double *vertices;     /* [V][3] within a cell of f = 0 */
-  unsigned char *faces; /* [V] bits: lies on a face of the box */
+  unsigned char *faces; /* [V] of the box that the vertex lies on, as in project.h */
   uint32_t *triangles;  /* [F][3] */
   size_t seeds_missed;
 } batten_rough_surface;
