@@ -9,6 +9,9 @@
 #include "base/checked.h"
 #include "basis/eigen3.h"
 
+static const double SAME = 1e-9; /* unit size: nearer points are one */
+static const double DOUBT =
+    0.1; /* by which planes must be better: noise, rims and uneven samples make some hundredths */
 static const double FLAT =
     1e-10; /* thickness over length; rounding of coordinates alone gives 1e-16 times their distance from 0 */
 
@@ -69,27 +72,142 @@ static batten_status check(batten_context *ctx, unsigned n, size_t count, const 
   return BATTEN_OK;
 }
 
+/* At most `most` points, each the farthest from those before it, the first the farthest from the centroid; none
+ * twice. chosen [most], distance [count] of work. Returns how many. */
+static size_t spread(unsigned n, size_t count, const double *points, size_t most, size_t *chosen, double *distance) {
+  size_t found = 0;
+  for (size_t i = 0; i < count; i++) distance[i] = INFINITY;
+  const double *from = (const double[3]){0};
+  while (found <= most) {
+    size_t next = 0;
+    double far = -1;
+    for (size_t i = 0; i < count; i++) {
+      double square = 0;
+      for (unsigned c = 0; c < n; c++) square += (points[i * n + c] - from[c]) * (points[i * n + c] - from[c]);
+      if (found == 0 || square < distance[i]) distance[i] = square;
+      if (distance[i] > far) far = distance[i], next = i;
+    }
+    if (found == 0) /* the centroid was only for the first */
+      for (size_t i = 0; i < count; i++) distance[i] = INFINITY;
+    if (found == most || far <= SAME * SAME) break;
+    chosen[found++] = next;
+    from = points + next * n;
+  }
+  return found;
+}
+
+/* Directions from the planes where they are sure, signs from the field's gradients. */
+static void sign_planes(const batten_orient_graph *g, const double *gradients, double *normals) {
+  unsigned n = g->n;
+  for (size_t i = 0; i < g->count; i++) {
+    const double *gradient = gradients + i * n, *plane = g->plane + i * n;
+    double along = 0, square = 0;
+    for (unsigned c = 0; c < n; c++) {
+      along += gradient[c] * plane[c];
+      square += gradient[c] * gradient[c];
+    }
+    bool sure = g->flatness[i] > 0.7 && along * along > 0.25 * square;
+    double length = sqrt(square);
+    for (unsigned c = 0; c < n; c++)
+      normals[i * n + c] = sure || !(length > 0) ? (along < 0 ? -plane[c] : plane[c]) : gradient[c] / length;
+  }
+}
+
+/* Least energy on a subset, and what its field says at all points. */
+static batten_status orient_subset(batten_context *ctx, const batten_orient_graph *graph, const double *start,
+                                   size_t energy_points, double *normals, double *lambda) {
+  unsigned n = graph->n;
+  size_t most = energy_points < graph->count ? energy_points : graph->count;
+  batten_orient_graph part = {0};
+  batten_orient_field field = {0};
+  double *gradients = NULL, *points = NULL, *some = NULL;
+  batten_status status = BATTEN_E_NOMEM;
+  size_t *chosen = batten_alloc_array(ctx, most, sizeof *chosen);
+  if (!chosen || !(gradients = batten_alloc_array(ctx, graph->count, n * sizeof *gradients)) ||
+      !(points = batten_alloc_array(ctx, most, n * sizeof *points)) ||
+      !(some = batten_alloc_array(ctx, most, n * sizeof *some)))
+    goto done;
+  size_t found = spread(n, graph->count, graph->points, most, chosen, gradients);
+  if (found < n + 2) {
+    status = batten_fail(ctx, BATTEN_E_INVALID, "points: %zu different ones; %u or more are needed", found, n + 2);
+    goto done;
+  }
+  for (size_t i = 0; i < found; i++) {
+    memcpy(points + i * n, graph->points + chosen[i] * n, n * sizeof *points);
+    memcpy(some + i * n, start + chosen[i] * n, n * sizeof *some);
+  }
+  if ((status = batten_orient_graph_new(ctx, n, found, points, &part)) < 0) goto done;
+  if ((status = batten_orient_energy(ctx, &part, some, &field)) < 0) goto done;
+  batten_orient_field_gradients(ctx, &field, graph->count, graph->points, gradients);
+  sign_planes(graph, gradients, normals);
+  *lambda = field.lambda;
+done:
+  batten_orient_field_free(ctx, &field);
+  batten_orient_graph_free(ctx, &part);
+  batten_free(ctx, some);
+  batten_free(ctx, points);
+  batten_free(ctx, gradients);
+  batten_free(ctx, chosen);
+  return status;
+}
+
+static batten_status orient_all(batten_context *ctx, const batten_orient_graph *graph, const double *start,
+                                double *normals, double *lambda) {
+  batten_orient_field field;
+  batten_status status = batten_orient_energy(ctx, graph, start, &field);
+  if (status < 0) return status;
+  memcpy(normals, field.normals, graph->count * graph->n * sizeof *normals);
+  *lambda = field.lambda;
+  batten_orient_field_free(ctx, &field);
+  return BATTEN_OK;
+}
+
+static bool has_equal_points(const batten_orient_graph *graph) {
+  size_t i = 0;
+  while (i < graph->count && graph->distance[i * graph->k] > SAME) i++;
+  return i < graph->count;
+}
+
+/* What speaks against normals, 0 .. 2: neighbours that oppose each other, and a surface that does not close. */
+static double doubt(const batten_orient_graph *graph, const double *normals) {
+  return batten_orient_conflicts(graph, normals) + batten_orient_openness(graph, normals);
+}
+
 batten_status batten_orient(batten_context *ctx, unsigned n, size_t count, const double *points,
                             batten_orient_method method, size_t energy_points, double *normals,
                             batten_orient_method *method_used, double *lambda_used) {
   batten_status status = check(ctx, n, count, points, method, energy_points, normals);
   if (status < 0) return status;
   batten_orient_graph graph = {0};
-  double *unit = NULL, *found = NULL;
+  double *unit = NULL, *planes = NULL, *energy = NULL, lambda = 0;
+  batten_orient_method used = BATTEN_ORIENT_METHOD_PLANES;
   status = BATTEN_E_NOMEM;
   if (!(unit = batten_alloc_array(ctx, count, n * sizeof *unit)) ||
-      !(found = batten_alloc_array(ctx, count, n * sizeof *found)))
+      !(planes = batten_alloc_array(ctx, count, n * sizeof *planes)))
     goto done;
   if ((status = to_unit_size(ctx, n, count, points, unit)) < 0) goto done;
   if ((status = batten_progress(ctx, "orient", 0)) < 0) goto done;
   if ((status = batten_orient_graph_new(ctx, n, count, unit, &graph)) < 0) goto done;
-  if ((status = batten_orient_planes(ctx, &graph, found)) < 0) goto done;
-  memcpy(normals, found, count * n * sizeof *normals);
-  if (method_used) *method_used = BATTEN_ORIENT_METHOD_PLANES;
-  if (lambda_used) *lambda_used = 0;
+  if ((status = batten_orient_planes(ctx, &graph, planes)) < 0) goto done;
+  if (method != BATTEN_ORIENT_METHOD_PLANES) {
+    status = BATTEN_E_NOMEM;
+    if (!(energy = batten_alloc_array(ctx, count, n * sizeof *energy))) goto done;
+    bool whole = count <= energy_points && !has_equal_points(&graph);
+    status = whole ? orient_all(ctx, &graph, planes, energy, &lambda)
+                   : orient_subset(ctx, &graph, planes, energy_points, energy, &lambda);
+    bool automatic = method == BATTEN_ORIENT_METHOD_AUTO;
+    if (status < 0 && !(automatic && status == BATTEN_E_SINGULAR)) goto done;
+    if (status >= 0 && !(automatic && doubt(&graph, energy) > doubt(&graph, planes) + DOUBT))
+      used = BATTEN_ORIENT_METHOD_ENERGY;
+    status = BATTEN_OK;
+  }
+  memcpy(normals, used == BATTEN_ORIENT_METHOD_ENERGY ? energy : planes, count * n * sizeof *normals);
+  if (method_used) *method_used = used;
+  if (lambda_used) *lambda_used = used == BATTEN_ORIENT_METHOD_ENERGY ? lambda : 0;
 done:
   batten_orient_graph_free(ctx, &graph);
-  batten_free(ctx, found);
+  batten_free(ctx, energy);
+  batten_free(ctx, planes);
   batten_free(ctx, unit);
   return status;
 }

@@ -30,8 +30,12 @@ void batten_orient_graph_free(batten_context *ctx, batten_orient_graph *graph);
  * the same with one of them turned round. About 0: nothing can be said. */
 double batten_orient_agreement(unsigned n, const double *a, const double *b, const double *u, const double *v);
 
-/* Share of the neighbour pairs on one locally flat piece whose normals have opposing signs, in [0, 1]. */
+/* Share of opposed signs among the neighbour pairs whose planes fit to one surface, in [0, 1]. */
 double batten_orient_conflicts(const batten_orient_graph *graph, const double *normals);
+
+/* |sum of area_i normal_i| / sum of area_i: 0 for a closed surface (divergence theorem), 1 for a sheet. The areas are
+ * those of the disks (lengths of the pieces) that hold the neighbours. */
+double batten_orient_openness(const batten_orient_graph *graph, const double *normals);
 
 /* Labels piece[i] < return value: points joined by neighbour pairs whose normals agree by more than `threshold`. With
  * threshold -2 the connected components of the neighbour graph. Numbered by their lowest point. */
@@ -44,5 +48,27 @@ double batten_orient_outwardness(unsigned n, const double *points, const double 
 
 /* normals [count][n] from the planes alone: see orient_planes.c. */
 batten_status batten_orient_planes(batten_context *ctx, const batten_orient_graph *graph, double *normals);
+/* The Hermite spline that least energy ends with, about the point `middle`:
+ * f(y) = sum a_i phi(y - y_i) - sum b_i . grad phi(y - y_i) + c0 + c . y,  y = x - middle,  phi(y) = |y|^3; positive
+ * outside. */
+typedef struct batten_orient_field {
+  unsigned n;
+  size_t count;
+  double middle[3];
+  double *points;  /* [count][n] y_i */
+  double *a, *b;   /* [count], [count][n] */
+  double c[3];     /* linear part; c0 plays no role in gradients */
+  double *normals; /* [count][n] gradients at the points: unit, outward */
+  double lambda;   /* smoothing at which it was settled, unit size */
+} batten_orient_field;
+
+/* Least energy over all points of the graph, which must be pairwise distinct: see orient_energy.c. start [count][n]
+ * is one of the starts. *field is empty on failure. Fails: SINGULAR, NOMEM, TOO_LARGE, CANCELLED. */
+batten_status batten_orient_energy(batten_context *ctx, const batten_orient_graph *graph, const double *start,
+                                   batten_orient_field *field);
+void batten_orient_field_free(batten_context *ctx, batten_orient_field *field);
+/* gradients [count][n] of f at points [count][n]. */
+void batten_orient_field_gradients(batten_context *ctx, const batten_orient_field *field, size_t count,
+                                   const double *points, double *gradients);
 
 #endif

@@ -14,7 +14,9 @@
 #include "basis/neighbours.h"
 
 /* Neighbours: enough to span a plane where points crowd along scan lines, few enough to stay local. */
-enum { NEIGHBOURS_2D = 4, NEIGHBOURS_3D = 10, CHUNK = 256 };
+enum { NEIGHBOURS_2D = 4, NEIGHBOURS_3D = 10, CHUNK = 256, WIDE = 64 };
+/* Neighbours that spread over less than this part of their length lie on a scan line or contour: no plane. */
+static const double THREAD = 0.3;
 
 static double dot(unsigned n, const double *a, const double *b) {
   double s = 0;
@@ -22,9 +24,15 @@ static double dot(unsigned n, const double *a, const double *b) {
   return s;
 }
 
-static void fit_plane(batten_orient_graph *g, size_t i) {
+typedef struct plane_task {
+  batten_orient_graph *graph;
+  const batten_tree *tree;
+} plane_task;
+
+/* Principal axes of a point and its neighbours: values [n] ascending, vectors [n][n] in rows. */
+static void principal_axes(const batten_orient_graph *g, size_t i, double *values, double *vectors) {
   unsigned n = g->n;
-  double mean[3] = {0}, second[9] = {0}, values[3], vectors[9];
+  double mean[3] = {0}, second[9] = {0};
   const double *x = g->points;
   for (size_t q = 0; q <= g->k; q++) {
     size_t j = q < g->k ? g->index[i * g->k + q] : i;
@@ -36,14 +44,39 @@ static void fit_plane(batten_orient_graph *g, size_t i) {
       for (unsigned c = 0; c < n; c++) second[r * n + c] += (x[j * n + r] - mean[r]) * (x[j * n + c] - mean[c]);
   }
   batten_eigen_symmetric(n, second, values, vectors);
-  memcpy(g->plane + i * n, vectors, n * sizeof *vectors);
-  g->flatness[i] = values[1] > 0 ? 1 - sqrt(fmax(values[0], 0) / values[1]) : 0;
 }
 
-static void fit_planes(void *graph, size_t chunk) {
-  batten_orient_graph *g = graph;
+/* Keeps the nearer half of the neighbours; the others become the nearest ones that stand off the line along axis. */
+static void look_beside(const batten_orient_graph *g, const batten_tree *tree, size_t i, const double *axis) {
+  size_t index[WIDE], keep = g->k / 2, found;
+  double distance[WIDE];
+  const double *x = g->points;
+  found = batten_tree_nearest(tree, x + i * 3, WIDE, i, index, distance);
+  for (size_t q = keep; q < found && keep < g->k; q++) {
+    double e[3];
+    for (int c = 0; c < 3; c++) e[c] = x[index[q] * 3 + (size_t)c] - x[i * 3 + (size_t)c];
+    double along = dot(3, e, axis);
+    /* off by 30 degrees, or no more candidates than places */
+    if (along * along > 0.75 * dot(3, e, e) && found - q > g->k - keep) continue;
+    g->index[i * g->k + keep] = index[q];
+    g->distance[i * g->k + keep++] = distance[q];
+  }
+}
+
+static void fit_planes(void *task, size_t chunk) {
+  plane_task *t = task;
+  batten_orient_graph *g = t->graph;
   size_t end = (chunk + 1) * CHUNK < g->count ? (chunk + 1) * CHUNK : g->count;
-  for (size_t i = chunk * CHUNK; i < end; i++) fit_plane(g, i);
+  for (size_t i = chunk * CHUNK; i < end; i++) {
+    double values[3], vectors[9];
+    principal_axes(g, i, values, vectors);
+    if (g->n == 3 && values[1] < THREAD * THREAD * values[2]) {
+      look_beside(g, t->tree, i, vectors + 6);
+      principal_axes(g, i, values, vectors);
+    }
+    memcpy(g->plane + i * g->n, vectors, g->n * sizeof *vectors);
+    g->flatness[i] = values[1] > 0 ? 1 - sqrt(fmax(values[0], 0) / values[1]) : 0;
+  }
 }
 
 void batten_orient_graph_free(batten_context *ctx, batten_orient_graph *g) {
@@ -60,6 +93,7 @@ batten_status batten_orient_graph_new(batten_context *ctx, unsigned n, size_t co
   if (k > count - 1) k = count - 1;
   if (!batten_mul(count, k, &pairs)) return batten_fail(ctx, BATTEN_E_TOO_LARGE, "count: %zu points", count);
   batten_orient_graph g = {.n = n, .count = count, .k = k, .points = points};
+  batten_tree *tree = NULL;
   batten_status status = BATTEN_E_NOMEM;
   if (!(g.index = batten_alloc_array(ctx, pairs, sizeof *g.index)) ||
       !(g.distance = batten_alloc_array(ctx, pairs, sizeof *g.distance)) ||
@@ -67,8 +101,10 @@ batten_status batten_orient_graph_new(batten_context *ctx, unsigned n, size_t co
       !(g.flatness = batten_alloc_array(ctx, count, sizeof *g.flatness)))
     goto done;
   if ((status = batten_neighbours(ctx, n, count, points, k, g.index, g.distance)) < 0) goto done;
-  batten_parallel(ctx, (count + CHUNK - 1) / CHUNK, fit_planes, &g);
+  if ((status = batten_tree_new(ctx, n, count, points, &tree)) < 0) goto done;
+  batten_parallel(ctx, (count + CHUNK - 1) / CHUNK, fit_planes, &(plane_task){&g, tree});
 done:
+  batten_tree_free(ctx, tree);
   if (status < 0) batten_orient_graph_free(ctx, &g);
   *graph = g;
   return status;
@@ -92,14 +128,25 @@ double batten_orient_conflicts(const batten_orient_graph *g, const double *norma
       size_t j = g->index[i * g->k + q];
       const double *p = g->plane + i * n, *r = g->plane + j * n, *x = g->points;
       double agreement = batten_orient_agreement(n, x + i * n, x + j * n, p, r);
-      /* one flat piece: both planes thin, alike (0.8: 37 degrees), and equal with and without the reflection */
-      if (fmin(g->flatness[i], g->flatness[j]) < 0.5 || fabs(agreement) < 0.8 ||
-          agreement * dot(n, p, r) < 0.8 * fabs(agreement))
+      double up = dot(n, p, normals + i * n), ur = dot(n, r, normals + j * n);
+      /* planes that mean something, fit to one surface (37 degrees), and are what the normals mean, too (45 degrees)
+       */
+      if (fmin(g->flatness[i], g->flatness[j]) < 0.5 || fabs(agreement) < 0.8 || fmin(fabs(up), fabs(ur)) < 0.7)
         continue;
       alike++;
-      if (agreement * dot(n, p, normals + i * n) * dot(n, r, normals + j * n) < 0) opposed++;
+      opposed += agreement * up * ur < 0;
     }
   return alike ? (double)opposed / (double)alike : 0;
+}
+
+double batten_orient_openness(const batten_orient_graph *g, const double *normals) {
+  double sum[3] = {0}, total = 0;
+  for (size_t i = 0; i < g->count; i++) {
+    double area = pow(g->distance[i * g->k + g->k - 1], g->n - 1.0);
+    for (unsigned c = 0; c < g->n; c++) sum[c] += area * normals[i * g->n + c];
+    total += area;
+  }
+  return total > 0 ? sqrt(dot(g->n, sum, sum)) / total : 1;
 }
 
 size_t batten_orient_pieces(const batten_orient_graph *g, const double *normals, double threshold, size_t *piece) {

@@ -2,6 +2,8 @@
 #ifndef ORIENT_SCENES_H
 #define ORIENT_SCENES_H
 
+#include <batten/solid.h>
+
 #include "tap.h"
 
 enum { SCENE_MAX = 20000 };
@@ -131,6 +133,30 @@ static inline double s_within(const scene *s, const double *normals, double angl
     good += cosine > cos(angle_deg * s_pi / 180);
   }
   return 100 * (double)good / (double)s->count;
+}
+
+/* Moves every point along its normal by a random length of at most `size`. */
+static inline void s_noise(scene *s, double size, uint64_t seed) {
+  for (size_t i = 0; i < s->count; i++) {
+    double along = size * (2 * t_uniform(&seed) - 1);
+    for (unsigned c = 0; c < s->n; c++) s->points[i * s->n + c] += along * s->normals[i * s->n + c];
+  }
+}
+
+/* Orients the scene and judges the result: method that must have been used, least percent within 90 and 30 degrees.
+ */
+static inline void s_orient(batten_context *ctx, const scene *s, batten_orient_method method, size_t energy_points,
+                            batten_orient_method expected, double least, double least_30) {
+  double *normals = calloc(s->count * s->n, sizeof *normals), lambda = -1, start = batten_now();
+  batten_orient_method used = BATTEN_ORIENT_METHOD_AUTO;
+  T_OK(batten_orient(ctx, s->n, s->count, s->points, method, energy_points, normals, &used, &lambda), ctx);
+  double share = s_within(s, normals, 90), share_30 = s_within(s, normals, 30), took = batten_now() - start;
+  T_CHECK(share >= least && share_30 >= least_30 && used == expected &&
+              (lambda > 0) == (used != BATTEN_ORIENT_METHOD_PLANES),
+          "%s, %zu points, %s: %.2f %% within 90 degrees (at least %g), %.2f %% within 30 (%g), lambda %.2g, %.2f s",
+          s->name, s->count, used == BATTEN_ORIENT_METHOD_PLANES ? "planes" : "energy", share, least, share_30,
+          least_30, lambda, took);
+  free(normals);
 }
 
 /* ../shared/data/NAME, or NULL when it is not there. */
