@@ -119,9 +119,15 @@ static void row(const char *name, unsigned n, unsigned m, size_t count, int with
   for (size_t i = 0; i < NODES * n; i++) nodes[i] = uniform(&seed);
   double all[BATTEN_POLYNOMIAL_MAX] = {0};
   for (unsigned a = 0; a <= n; a++) all[a] = polynomial[a];
-  batten_spline_parts p = {.struct_size = sizeof p, .n = n, .m = m, .count = count, .centers = centers,
-                           .coefficients = coefficients, .polynomial_count = batten_polynomial_count(n, m - 1),
-                           .polynomial = all, .scale = 1};
+  batten_spline_parts p = {.struct_size = sizeof p,
+                           .n = n,
+                           .m = m,
+                           .count = count,
+                           .centers = centers,
+                           .coefficients = coefficients,
+                           .polynomial_count = batten_polynomial_count(n, m - 1),
+                           .polynomial = all,
+                           .scale = 1};
   double scalar = time_plain(&p, with_gradient), one = time_batten(&p, with_gradient, 1),
          two = time_batten(&p, with_gradient, 2);
   printf("| %s | %zu | %s | %.2f | %.2f | %.2f | %.1f | %.1f | %.2f | %.1e | %.1e |\n", name, count,
@@ -141,8 +147,10 @@ int main(void) {
 #else
   printf("Inner loops for %s, batten %s.\n", batten_spline_code()->name, batten_version());
 #endif
-  printf("%d nodes; times in ms; speed-up over the plain scalar loop on 1 and 2 threads; 1e9 pairs (node, centre) a "
-         "second on 2 threads.\n\n", (int)NODES);
+  printf(
+      "%d nodes; times in ms; speed-up over the plain scalar loop on 1 and 2 threads; 1e9 pairs (node, centre) a "
+      "second on 2 threads.\n\n",
+      (int)NODES);
   printf("| kernel | N | what | plain | 1 thread | 2 threads | x (1) | x (2) | Gpairs/s | error plain | error |\n");
   printf("|---|---|---|---|---|---|---|---|---|---|---|\n");
   for (size_t k = 0; k < sizeof kernels / sizeof kernels[0]; k++)

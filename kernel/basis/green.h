@@ -54,7 +54,8 @@ BATTEN_ALWAYS_INLINE double batten_log_normal(double x) {
   k -= 0x1p52 + 1023;
   double f = t - 1, s = f / (2 + f), z = s * s, z2 = z * z;
   /* Two half-length chains in z^2: half the latency. */
-  double even = 0x1.5555555555558p-1 + z2 * (0x1.2492492df281ap-2 + z2 * (0x1.7462b51cb66b1p-3 + z2 * 0x1.2b5900de53b32p-3));
+  double even =
+      0x1.5555555555558p-1 + z2 * (0x1.2492492df281ap-2 + z2 * (0x1.7462b51cb66b1p-3 + z2 * 0x1.2b5900de53b32p-3));
   double odd = 0x1.99999999952d7p-2 + z2 * (0x1.c71c62e3f11e6p-3 + z2 * 0x1.39fe51a7c18f9p-3);
   double tail = s * (f - z * (even + z * odd));
   /* ln 2 in two parts, the first with 21 zero bits at its end: its product with k is exact. */
@@ -65,8 +66,8 @@ typedef struct batten_radial {
   double f0, f1, f2, f3; /* phi, phi1, phi2, phi3 without the sign s */
 } batten_radial;
 
-/* Up to derivative `order` (0 .. 3; the rest is 0), for d2 >= 0. power and order are compile-time constants where speed
- * counts. Distances below 1e-90 count as 0: their inverse cubes would overflow. */
+/* Up to derivative `order` (0 .. 3; the rest is 0), for d2 >= 0. power and order are compile-time constants where
+ * speed counts. Distances below 1e-90 count as 0: their inverse cubes would overflow. */
 BATTEN_ALWAYS_INLINE batten_radial batten_green_radial(unsigned power, unsigned order, double d2) {
   batten_radial out = {0, 0, 0, 0};
   if (power % 2) {

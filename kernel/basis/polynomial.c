@@ -54,8 +54,8 @@ void batten_polynomial_row(const batten_polynomial *basis, const double *x, int 
   }
 }
 
-void batten_polynomial_sum(const batten_polynomial *basis, const double *coefficients, const double *x, unsigned order,
-                           double sums[10]) {
+void batten_polynomial_sum(const batten_polynomial *basis, const double *coefficients, const double *x,
+                           unsigned order, double sums[10]) {
   static const unsigned char derivative[10][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {2, 0, 0},
                                                   {1, 1, 0}, {1, 0, 1}, {0, 2, 0}, {0, 1, 1}, {0, 0, 2}};
   if (order > basis->degree) order = basis->degree; /* the others are 0 */

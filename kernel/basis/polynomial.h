@@ -25,7 +25,7 @@ void batten_polynomial_row(const batten_polynomial *basis, const double *x, int 
 
 /* The sum of coefficients[q] times monomial q at x [n], and its derivatives up to `order` (0, 1, 2), in the order
  * U, U_x, U_y, U_z, U_xx, U_xy, U_xz, U_yy, U_yz, U_zz; axes >= n give 0, derivatives above `order` too. */
-void batten_polynomial_sum(const batten_polynomial *basis, const double *coefficients, const double *x, unsigned order,
-                           double sums[10]);
+void batten_polynomial_sum(const batten_polynomial *basis, const double *coefficients, const double *x,
+                           unsigned order, double sums[10]);
 
 #endif

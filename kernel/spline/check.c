@@ -7,24 +7,25 @@
 
 #include <float.h>
 
-/* ---- single numbers ---------------------------------------------------------------------------------------------- */
+/* ---- single numbers ---- */
 
 static batten_status check_rows(batten_context *ctx, const char *name, size_t count, size_t n, const double *values) {
   size_t i = batten_first_nonfinite(count * n, values);
   if (i == count * n) return BATTEN_OK;
-  if (n == 1) return batten_fail(ctx, BATTEN_E_INVALID, "%s[%zu]: %g; must be finite, drop the point", name, i, values[i]);
+  if (n == 1)
+    return batten_fail(ctx, BATTEN_E_INVALID, "%s[%zu]: %g; must be finite, drop the point", name, i, values[i]);
   return batten_fail(ctx, BATTEN_E_INVALID, "%s[%zu][%zu]: %g; must be finite, drop the point", name, i / n, i % n,
                      values[i]);
 }
 
 static batten_status check_orders(batten_context *ctx, const batten_spline_data *data, unsigned m) {
-  if (data->n < 1 || data->n > 3)
-    return batten_fail(ctx, BATTEN_E_INVALID, "data.n: %u; must be 1, 2 or 3", data->n);
+  if (data->n < 1 || data->n > 3) return batten_fail(ctx, BATTEN_E_INVALID, "data.n: %u; must be 1, 2 or 3", data->n);
   if (2 * m <= data->n || m > 4)
     return batten_fail(ctx, BATTEN_E_INVALID, "opt.m: %u; with n = %u it must be %u .. 4", m, data->n,
                        data->n / 2 + 1);
   if (data->gradient_count && batten_green_power(data->n, m) <= 2)
-    return batten_fail(ctx, BATTEN_E_INVALID, "data.gradient_count: %zu with m = %u; gradients need 2m - n > 2, take m = %u",
+    return batten_fail(ctx, BATTEN_E_INVALID,
+                       "data.gradient_count: %zu with m = %u; gradients need 2m - n > 2, take m = %u",
                        data->gradient_count, m, data->n / 2 + 2);
   return BATTEN_OK;
 }
@@ -63,16 +64,17 @@ batten_status batten_spline_check_data(batten_context *ctx, const batten_spline_
     return batten_fail(ctx, BATTEN_E_TOO_LARGE, "data.count: %zu", data->count);
   if ((data->count && (!data->points || !data->values)) || (data->gradient_count && !data->gradients))
     return batten_fail(ctx, BATTEN_E_INVALID, "data.%s: NULL",
-                       !data->points ? "points" : !data->values ? "values" : "gradients");
-  if (data->count == 0)
-    return batten_fail(ctx, BATTEN_E_INVALID, "data.count: 0 points; at least one is needed");
+                       !data->points   ? "points"
+                       : !data->values ? "values"
+                                       : "gradients");
+  if (data->count == 0) return batten_fail(ctx, BATTEN_E_INVALID, "data.count: 0 points; at least one is needed");
   if ((st = check_rows(ctx, "points", data->count, data->n, data->points)) < 0) return st;
   if ((st = check_rows(ctx, "values", data->count, 1, data->values)) < 0) return st;
   if ((st = check_gradients(ctx, data)) < 0) return st;
   return check_smoothing(ctx, data, opt);
 }
 
-/* ---- equal points ------------------------------------------------------------------------------------------------ */
+/* ---- equal points ---- */
 
 /* Lexicographic order of points i and j: < 0, 0, > 0. */
 static int compare(const spline_system *s, size_t i, size_t j) {
@@ -121,10 +123,11 @@ static batten_status check_distinct(batten_context *ctx, const spline_system *s)
     }
   batten_free(ctx, order);
   if (later == SIZE_MAX) return BATTEN_OK;
-  return batten_fail(ctx, BATTEN_E_INVALID, "points[%zu]: equals points[%zu]; merge equal points first", later, earlier);
+  return batten_fail(ctx, BATTEN_E_INVALID, "points[%zu]: equals points[%zu]; merge equal points first", later,
+                     earlier);
 }
 
-/* ---- points on a line or in a plane ------------------------------------------------------------------------------ */
+/* ---- points on a line or in a plane ---- */
 
 typedef struct principal_axes {
   double mean[3], axis[9]; /* rows: smallest to largest spread */
@@ -157,8 +160,8 @@ static double thickness(const spline_system *s, const principal_axes *axes, unsi
   return largest;
 }
 
-/* The points must not lie in one plane (line in 2-D): the linear part would not be determined; and where gradients are
- * given, m >= 3, and the square of the plane's equation vanishes with its gradient. */
+/* The points must not lie in one plane (line in 2-D): the linear part would not be determined; and where gradients
+ * are given, m >= 3, and the square of the plane's equation vanishes with its gradient. */
 static batten_status check_flat(batten_context *ctx, const spline_system *s) {
   if (s->m < 2 || s->n < 2) return BATTEN_OK;
   principal_axes axes = find_axes(s);
@@ -169,13 +172,19 @@ static batten_status check_flat(batten_context *ctx, const spline_system *s) {
   const double *normal = axes.axis, *along = axes.axis + (s->n - 1) * s->n;
   if (thickness(s, &axes, 0) > tolerance) return BATTEN_OK;
   if (s->n == 2)
-    return batten_fail(ctx, BATTEN_E_SINGULAR, "points: all %zu lie on a line with direction (%.6g, %.6g); add a point "
-                       "off it, or fit in one dimension", s->count, along[0], along[1]);
+    return batten_fail(ctx, BATTEN_E_SINGULAR,
+                       "points: all %zu lie on a line with direction (%.6g, %.6g); add a point "
+                       "off it, or fit in one dimension",
+                       s->count, along[0], along[1]);
   if (thickness(s, &axes, 1) <= tolerance)
-    return batten_fail(ctx, BATTEN_E_SINGULAR, "points: all %zu lie on a line with direction (%.6g, %.6g, %.6g); add "
-                       "points off it, or fit in one dimension", s->count, along[0], along[1], along[2]);
-  return batten_fail(ctx, BATTEN_E_SINGULAR, "points: all %zu lie in a plane with normal (%.6g, %.6g, %.6g); add a point "
-                     "off it, or fit in two dimensions", s->count, normal[0], normal[1], normal[2]);
+    return batten_fail(ctx, BATTEN_E_SINGULAR,
+                       "points: all %zu lie on a line with direction (%.6g, %.6g, %.6g); add "
+                       "points off it, or fit in one dimension",
+                       s->count, along[0], along[1], along[2]);
+  return batten_fail(ctx, BATTEN_E_SINGULAR,
+                     "points: all %zu lie in a plane with normal (%.6g, %.6g, %.6g); add a point "
+                     "off it, or fit in two dimensions",
+                     s->count, normal[0], normal[1], normal[2]);
 }
 
 batten_status batten_spline_check_points(batten_context *ctx, const spline_system *s) {
@@ -183,8 +192,9 @@ batten_status batten_spline_check_points(batten_context *ctx, const spline_syste
   if (st < 0) return st;
   const unsigned k = s->basis.count;
   if (s->rows < k)
-    return batten_fail(ctx, BATTEN_E_INVALID, "data.count: %zu points and %zu gradients give %zu conditions, the "
-                       "polynomial of degree %u needs %u; add points or lower m", s->count, s->gradient_count, s->rows,
-                       s->m - 1, k);
+    return batten_fail(ctx, BATTEN_E_INVALID,
+                       "data.count: %zu points and %zu gradients give %zu conditions, the "
+                       "polynomial of degree %u needs %u; add points or lower m",
+                       s->count, s->gradient_count, s->rows, s->m - 1, k);
   return check_flat(ctx, s);
 }

@@ -21,9 +21,9 @@ typedef struct fit {
   batten_spline_options opt;
   spline_system system;
   batten_saddle *saddle;
-  double middle;  /* subtracted from the values */
-  int exponent;   /* then divided by 2^exponent */
-  double *f, *w;  /* [rows] right side, solution */
+  double middle; /* subtracted from the values */
+  int exponent;  /* then divided by 2^exponent */
+  double *f, *w; /* [rows] right side, solution */
   double c[BATTEN_POLYNOMIAL_MAX];
   batten_spline *spline;
   batten_spline_info info;
@@ -48,7 +48,7 @@ size_t batten_spline_bytes(batten_saddle_method method, unsigned n, unsigned m, 
   return batten_add(bytes, own, &total) ? total : SIZE_MAX;
 }
 
-/* ---- units of value ---------------------------------------------------------------------------------------------- */
+/* ---- units of value ---- */
 
 static double smoothing_at(const fit *t, size_t i) {
   return t->opt.smoothing_per_point ? t->opt.smoothing_per_point[i] : t->opt.smoothing;
@@ -81,8 +81,10 @@ static batten_status make_right_side(fit *t) {
   double range = value_range(d, &t->middle), slope = s->scale * largest_gradient(d, d->gradients);
   double largest = fmax(0.5 * range, slope);
   if (!(largest <= 1e150))
-    return batten_fail(t->ctx, BATTEN_E_INVALID, "values: range %g with gradients up to %g per box; choose a unit that "
-                       "brings them below 1e150", range, slope);
+    return batten_fail(t->ctx, BATTEN_E_INVALID,
+                       "values: range %g with gradients up to %g per box; choose a unit that "
+                       "brings them below 1e150",
+                       range, slope);
   t->f = batten_alloc_array(t->ctx, s->rows, sizeof *t->f);
   t->w = batten_alloc_array(t->ctx, s->rows, sizeof *t->w);
   if (!t->f || !t->w) return BATTEN_E_NOMEM;
@@ -94,7 +96,7 @@ static batten_status make_right_side(fit *t) {
   return BATTEN_OK;
 }
 
-/* ---- solving ----------------------------------------------------------------------------------------------------- */
+/* ---- solving ---- */
 
 /* As many conditions as monomials: P c = f alone, by elimination with pivots. false when P is singular. */
 static bool solve_polynomial(fit *t) {
@@ -135,9 +137,12 @@ static bool solve_polynomial(fit *t) {
 
 static batten_status fail_singular(const fit *t, const char *detail) {
   const spline_system *s = &t->system;
-  return batten_fail(t->ctx, BATTEN_E_SINGULAR, "points: the system of the %zu points is singular to working precision: some "
-                     "nearly coincide, or all lie on or near the zero set of one polynomial of degree %u; merge near points, "
-                     "lower m = %u, or set opt.smoothing (%s)", s->count, s->m - 1, s->m, detail);
+  return batten_fail(
+      t->ctx, BATTEN_E_SINGULAR,
+      "points: the system of the %zu points is singular to working precision: some "
+      "nearly coincide, or all lie on or near the zero set of one polynomial of degree %u; merge near points, "
+      "lower m = %u, or set opt.smoothing (%s)",
+      s->count, s->m - 1, s->m, detail);
 }
 
 static batten_status solve(fit *t) {
@@ -146,8 +151,8 @@ static batten_status solve(fit *t) {
     t->info.saddle.rcond = NAN;
     return solve_polynomial(t) ? BATTEN_OK : fail_singular(t, "as many conditions as monomials");
   }
-  batten_saddle_matrix matrix = {.n = s->rows, .k = s->basis.count, .p = s->p, .fill = batten_spline_system_fill,
-                                 .user = s};
+  batten_saddle_matrix matrix = {
+      .n = s->rows, .k = s->basis.count, .p = s->p, .fill = batten_spline_system_fill, .user = s};
   batten_saddle_options o = t->opt.saddle;
   if (s->power > 1) o.smooth_kernel = 1;
   batten_status st = batten_saddle_factor(t->ctx, &matrix, &o, &t->saddle);
@@ -158,10 +163,11 @@ static batten_status solve(fit *t) {
   return st < 0 ? st : BATTEN_OK;
 }
 
-/* ---- leave-one-out ----------------------------------------------------------------------------------------------- */
+/* ---- leave-one-out ---- */
 
-/* U_without_i(x_i) - v_i = -w_i / (inverse matrix)_ii  [Rippa 1999], with or without smoothing: the row and column that
- * go take the point's own smoothing with them. Points that the polynomial part cannot miss have no such error. */
+/* U_without_i(x_i) - v_i = -w_i / (inverse matrix)_ii  [Rippa 1999], with or without smoothing: the row and column
+ * that go take the point's own smoothing with them. Points that the polynomial part cannot miss have no such error.
+ */
 static batten_status leave_one_out(fit *t) {
   const size_t count = t->system.count;
   size_t samples = t->opt.loo_samples < count ? t->opt.loo_samples : count;
@@ -190,7 +196,7 @@ done:
   return st;
 }
 
-/* ---- the result -------------------------------------------------------------------------------------------------- */
+/* ---- the result ---- */
 
 /* w' K w = w' f - rho w' w, because P' w = 0. */
 static double energy(const fit *t) {
@@ -265,13 +271,15 @@ static batten_status find_residuals(fit *t) {
 }
 
 static batten_status judge(const fit *t) {
-  double middle, range = value_range(t->data, &middle), worst = fmax(t->info.residual_max, t->info.gradient_residual_max);
+  double middle, range = value_range(t->data, &middle),
+                 worst = fmax(t->info.residual_max, t->info.gradient_residual_max);
   /* Values about 1e8 with a range of 1 have only 8 digits of it to be met. */
   double digits = range > 0 ? 4 * DBL_EPSILON * (fabs(middle) / range) : 0;
   if (worst <= RESIDUAL_PROMISED + digits) return BATTEN_OK;
-  return batten_fail(t->ctx, BATTEN_W_ACCURACY, "residual: %.3g of the data's range, above %g (reciprocal condition %.3g); "
-                     "merge points that nearly coincide, lower m, or set opt.smoothing", worst, RESIDUAL_PROMISED,
-                     t->info.saddle.rcond);
+  return batten_fail(t->ctx, BATTEN_W_ACCURACY,
+                     "residual: %.3g of the data's range, above %g (reciprocal condition %.3g); "
+                     "merge points that nearly coincide, lower m, or set opt.smoothing",
+                     worst, RESIDUAL_PROMISED, t->info.saddle.rcond);
 }
 
 batten_status batten_spline_fit(batten_context *ctx, const batten_spline_data *data, const batten_spline_options *opt,

@@ -7,8 +7,8 @@
 #include "basis/polynomial.h"
 #include "spline/sum.h"
 
-/* The caller's unit <-> the unit box. Everybody who changes units uses this one line, so that a centre that is evaluated
- * meets itself at distance exactly 0. */
+/* The caller's unit <-> the unit box. Everybody who changes units uses this one line, so that a centre that is
+ * evaluated meets itself at distance exactly 0. */
 static inline double spline_to_box(double x, double origin, double scale) { return (x - origin) / scale; }
 
 /* The system of a fit: unknowns 0 .. N-1 are the weights of the values, N + a M + q the weight of the
@@ -27,8 +27,8 @@ typedef struct spline_system {
   const spline_code *code;
 } spline_system;
 
-/* Units, coordinates and polynomial part of checked data. Fails: INVALID (extent overflows), NOMEM. Freed in both cases
- * by batten_spline_system_free; opt's arrays must live as long. */
+/* Units, coordinates and polynomial part of checked data. Fails: INVALID (extent overflows), NOMEM. Freed in both
+ * cases by batten_spline_system_free; opt's arrays must live as long. */
 batten_status batten_spline_system_make(batten_context *ctx, const batten_spline_data *data,
                                         const batten_spline_options *opt, spline_system *system);
 void batten_spline_system_free(batten_context *ctx, spline_system *system);

@@ -16,11 +16,11 @@ struct batten_spline {
   batten_spline_parts parts; /* pointers into the blocks below */
   batten_polynomial basis;
   spline_terms terms;
-  double *numbers;      /* everything of type double */
+  double *numbers; /* everything of type double */
   size_t *gradient_at;
 };
 
-/* ---- making ------------------------------------------------------------------------------------------------------ */
+/* ---- making ---- */
 
 batten_spline_data batten_spline_data_default(void) {
   return (batten_spline_data){.struct_size = sizeof(batten_spline_data), .n = 3};
@@ -40,14 +40,15 @@ static batten_status check_parts(batten_context *ctx, const batten_spline_parts 
                        p->m);
   unsigned k = batten_polynomial_count(p->n, p->m - 1);
   if (p->polynomial_count != k)
-    return batten_fail(ctx, BATTEN_E_INVALID, "parts.polynomial_count: %zu; %u for n = %u, m = %u", p->polynomial_count,
-                       k, p->n, p->m);
+    return batten_fail(ctx, BATTEN_E_INVALID, "parts.polynomial_count: %zu; %u for n = %u, m = %u",
+                       p->polynomial_count, k, p->n, p->m);
   if (p->gradient_count > p->count)
     return batten_fail(ctx, BATTEN_E_INVALID, "parts.gradient_count: %zu, more than parts.count = %zu",
                        p->gradient_count, p->count);
   if (p->gradient_count && batten_green_power(p->n, p->m) <= 2)
-    return batten_fail(ctx, BATTEN_E_INVALID, "parts.gradient_count: %zu with n = %u, m = %u; gradients need 2m - n > 2",
-                       p->gradient_count, p->n, p->m);
+    return batten_fail(ctx, BATTEN_E_INVALID,
+                       "parts.gradient_count: %zu with n = %u, m = %u; gradients need 2m - n > 2", p->gradient_count,
+                       p->n, p->m);
   if (!p->polynomial || (p->count && (!p->centers || !p->coefficients)) ||
       (p->gradient_count && (!p->gradient_at || !p->gradient_coefficients)))
     return batten_fail(ctx, BATTEN_E_INVALID, "parts: an array is NULL");
@@ -56,8 +57,9 @@ static batten_status check_parts(batten_context *ctx, const batten_spline_parts 
     return batten_fail(ctx, BATTEN_E_TOO_LARGE, "parts.count: %zu", p->count);
   for (size_t q = 0; q < p->gradient_count; q++)
     if (p->gradient_at[q] >= p->count || (q > 0 && p->gradient_at[q] <= p->gradient_at[q - 1]))
-      return batten_fail(ctx, BATTEN_E_INVALID, "parts.gradient_at[%zu]: %zu; must increase and be < parts.count = %zu",
-                         q, p->gradient_at[q], p->count);
+      return batten_fail(ctx, BATTEN_E_INVALID,
+                         "parts.gradient_at[%zu]: %zu; must increase and be < parts.count = %zu", q,
+                         p->gradient_at[q], p->count);
   if (!(p->scale > 0) || !isfinite(p->scale))
     return batten_fail(ctx, BATTEN_E_INVALID, "parts.scale: %g; must be > 0 and finite", p->scale);
   if ((st = check_finite(ctx, "parts.origin", p->n, p->origin)) < 0) return st;
@@ -75,8 +77,7 @@ static double *copy(double *to, size_t count, const double *from) {
 /* Centre i of the caller as term j. */
 static void set_term(const batten_spline *s, double *x[3], double *w, size_t j, size_t i) {
   const batten_spline_parts *p = &s->parts;
-  for (unsigned a = 0; a < p->n; a++)
-    x[a][j] = spline_to_box(p->centers[i * p->n + a], p->origin[a], p->scale);
+  for (unsigned a = 0; a < p->n; a++) x[a][j] = spline_to_box(p->centers[i * p->n + a], p->origin[a], p->scale);
   w[j] = batten_green_sign(s->terms.power) * p->coefficients[i];
 }
 
@@ -151,7 +152,7 @@ void batten_spline_free(batten_spline *s) {
   batten_free(s->ctx, s);
 }
 
-/* ---- evaluating -------------------------------------------------------------------------------------------------- */
+/* ---- evaluating ---- */
 
 enum { TASK_POINTS = 64 };
 /* Terms below which a second thread costs more than it saves (20 us against 0.3 ns a term), and terms between two
@@ -176,8 +177,7 @@ static void store_point(const evaluation *e, size_t point, const double sums[SPL
   if (e->values) e->values[point] = sums[0];
   for (unsigned a = 0; a < n && e->gradients; a++) e->gradients[point * n + a] = sums[1 + a] / scale;
   for (unsigned a = 0; a < n && e->hessians; a++)
-    for (unsigned b = 0; b < n; b++)
-      e->hessians[(point * n + a) * n + b] = sums[hessian_sum[a][b]] / scale / scale;
+    for (unsigned b = 0; b < n; b++) e->hessians[(point * n + a) * n + b] = sums[hessian_sum[a][b]] / scale / scale;
 }
 
 /* Points first .. first + lanes - 1, lanes <= SPLINE_LANES; lanes left over repeat the last point. */
@@ -214,7 +214,7 @@ batten_status batten_spline_evaluate(batten_context *ctx, const batten_spline *s
   if (count && !points) return batten_fail(ctx, BATTEN_E_INVALID, "points: NULL with count = %zu", count);
   evaluation e = {.spline = s,
                   .sum = batten_spline_code()->sum,
-                  .order = hessians ? 2 : gradients ? 1 : 0,
+                  .order = hessians ? 2 : gradients != NULL,
                   .points = points,
                   .values = values,
                   .gradients = gradients,

@@ -1,8 +1,8 @@
 /* Sums over all centres and tiles of the matrix, for one instruction set (see sum.h).
  *
  * SPLINE_LANES points go side by side through the loop over the centres: the compiler turns each loop over the lanes
- * into a few vector instructions and keeps the sums in registers. Each kernel power, dimension and order of derivative
- * has its own function, made from one inline body by constants. */
+ * into a few vector instructions and keeps the sums in registers. Each kernel power, dimension and order of
+ * derivative has its own function, made from one inline body by constants. */
 #include "spline/sum.h"
 
 #include "basis/green.h"
@@ -62,21 +62,21 @@ BATTEN_ALWAYS_INLINE void add_centre(unsigned n, unsigned power, unsigned order,
 BATTEN_ALWAYS_INLINE void add_centres(unsigned n, unsigned power, unsigned order, bool hermite, const spline_terms *c,
                                       double x[3][SPLINE_LANES], double sums[SPLINE_SUMS][SPLINE_LANES]) {
   const size_t first = hermite ? c->plain : 0, last = hermite ? c->plain + c->hermite : c->plain;
-  const unsigned used = order == 0 ? 1 : order == 1 ? 4 : SPLINE_SUMS;
+  static const unsigned used_by_order[3] = {1, 4, SPLINE_SUMS};
+  const unsigned used = used_by_order[order];
   for (size_t j0 = first; j0 < last; j0 += CHUNK) {
     const size_t j1 = last - j0 < CHUNK ? last : j0 + CHUNK;
     double part[SPLINE_SUMS][SPLINE_LANES] = {{0}};
     for (size_t j = j0; j < j1; j++) add_centre(n, power, order, hermite, c, j, x, part);
-    for (unsigned q = 0; q < used; q++)
-      LANES_LOOP(unsigned i = 0; i < SPLINE_LANES; i++) sums[q][i] += part[q][i];
+    for (unsigned q = 0; q < used; q++) LANES_LOOP(unsigned i = 0; i < SPLINE_LANES; i++) sums[q][i] += part[q][i];
   }
 }
 
 /* One function per kernel, order of derivative, and kind of data. */
-#define SUM_FUNCTION(n, power, order, hermite)                                                                   \
-  static void sum_##n##_##power##_##order##_##hermite(const spline_terms *c, double x[3][SPLINE_LANES],           \
-                                                      double sums[SPLINE_SUMS][SPLINE_LANES]) {                   \
-    add_centres(n, power, order, hermite, c, x, sums);                                                            \
+#define SUM_FUNCTION(n, power, order, hermite)                                                          \
+  static void sum_##n##_##power##_##order##_##hermite(const spline_terms *c, double x[3][SPLINE_LANES], \
+                                                      double sums[SPLINE_SUMS][SPLINE_LANES]) {         \
+    add_centres(n, power, order, hermite, c, x, sums);                                                  \
   }
 #define PLAIN_FUNCTIONS(n, power) \
   SUM_FUNCTION(n, power, 0, 0) SUM_FUNCTION(n, power, 1, 0) SUM_FUNCTION(n, power, 2, 0)
@@ -91,7 +91,8 @@ static part_function *const plain_functions[4][8][3] = {
 #define PLAIN_ROW(n, power) [n][power] = {sum_##n##_##power##_0_0, sum_##n##_##power##_1_0, sum_##n##_##power##_2_0},
     KERNELS(PLAIN_ROW)};
 static part_function *const hermite_functions[4][8][3] = {
-#define HERMITE_ROW(n, power) [n][power] = {sum_##n##_##power##_0_1, sum_##n##_##power##_1_1, sum_##n##_##power##_2_1},
+#define HERMITE_ROW(n, power) \
+  [n][power] = {sum_##n##_##power##_0_1, sum_##n##_##power##_1_1, sum_##n##_##power##_2_1},
     SMOOTH_KERNELS(HERMITE_ROW)};
 
 static void sum(const spline_terms *c, unsigned order, double x[3][SPLINE_LANES],
@@ -139,9 +140,7 @@ static spline_tile_function *const fill_functions[3][4][8] = {
 #define FILL_1(n, power) [1][n][power] = fill_##n##_##power##_1, [2][n][power] = fill_##n##_##power##_2,
     KERNELS(FILL_0) SMOOTH_KERNELS(FILL_1)};
 
-static void tile(const spline_tile *t) {
-  fill_functions[(t->row_axis >= 0) + (t->col_axis >= 0)][t->n][t->power](t);
-}
+static void tile(const spline_tile *t) { fill_functions[(t->row_axis >= 0) + (t->col_axis >= 0)][t->n][t->power](t); }
 
 #define SPLINE_NAME_TEXT_(a) #a
 #define SPLINE_NAME_TEXT(a) SPLINE_NAME_TEXT_(a)

@@ -15,11 +15,11 @@ enum {
 /* All in the unit box. The sign s of the kernel is in w and g. */
 typedef struct spline_terms {
   unsigned n, power;
-  size_t plain;        /* centres 0 .. plain-1 have a value term only */
-  size_t hermite;      /* the next so many have a gradient term too */
-  const double *x[3];  /* [plain + hermite] */
-  const double *w;     /* [plain + hermite] */
-  const double *g[3];  /* [hermite] */
+  size_t plain;       /* centres 0 .. plain-1 have a value term only */
+  size_t hermite;     /* the next so many have a gradient term too */
+  const double *x[3]; /* [plain + hermite] */
+  const double *w;    /* [plain + hermite] */
+  const double *g[3]; /* [hermite] */
 } spline_terms;
 
 /* sums[q][lane] += the terms of all centres at the points x[axis][lane], for q that belong to derivatives up to order

@@ -24,8 +24,10 @@ static batten_status set_box(batten_context *ctx, const batten_spline_data *data
   }
   /* Gradients are multiplied by the scale and Hessians divided by its square. */
   if (extent > 1e100 || (extent > 0 && extent < 1e-100))
-    return batten_fail(ctx, BATTEN_E_INVALID, "points: longest side of their box is %g; choose a unit of length that "
-                       "brings it between 1e-100 and 1e100", extent);
+    return batten_fail(ctx, BATTEN_E_INVALID,
+                       "points: longest side of their box is %g; choose a unit of length that "
+                       "brings it between 1e-100 and 1e100",
+                       extent);
   s->scale = extent > 0 ? extent : 1;
   return BATTEN_OK;
 }
@@ -116,10 +118,16 @@ void batten_spline_system_fill(const void *user, size_t row0, size_t rows, size_
     c = stretch_at(s, j, col0 + cols);
     for (size_t i = row0; i < row0 + rows; i += r.count) {
       r = stretch_at(s, i, row0 + rows);
-      spline_tile t = {.n = s->n, .power = s->power, .row_axis = r.axis, .col_axis = c.axis,
-                       .rows = r.count, .cols = c.count,
-                       .row_x = {r.x[0], r.x[1], r.x[2]}, .col_x = {c.x[0], c.x[1], c.x[2]},
-                       .tile = tile + (i - row0) + (j - col0) * ld, .ld = ld};
+      spline_tile t = {.n = s->n,
+                       .power = s->power,
+                       .row_axis = r.axis,
+                       .col_axis = c.axis,
+                       .rows = r.count,
+                       .cols = c.count,
+                       .row_x = {r.x[0], r.x[1], r.x[2]},
+                       .col_x = {c.x[0], c.x[1], c.x[2]},
+                       .tile = tile + (i - row0) + (j - col0) * ld,
+                       .ld = ld};
       s->code->tile(&t);
     }
   }

@@ -112,8 +112,8 @@ static void test_definite(void) {
           }
         least = fmin(least, form / size);
       }
-      T_CHECK(least > 1e-12, "n = %u, m = %u: w'Kw > 0 on 50 random weights, least %.3g of the sum of its parts", n, m,
-              least);
+      T_CHECK(least > 1e-12, "n = %u, m = %u: w'Kw > 0 on 50 random weights, least %.3g of the sum of its parts", n,
+              m, least);
     }
 }
 
@@ -123,12 +123,14 @@ static void test_polynomial(void) {
   const unsigned counts[3][4] = {{1, 2, 3, 4}, {1, 3, 6, 10}, {1, 4, 10, 20}};
   for (unsigned n = 1; n <= 3; n++)
     for (unsigned d = 0; d < 4; d++)
-      T_CHECK(batten_polynomial_count(n, d) == counts[n - 1][d] && batten_polynomial_basis(n, d).count == counts[n - 1][d],
+      T_CHECK(batten_polynomial_count(n, d) == counts[n - 1][d] &&
+                  batten_polynomial_basis(n, d).count == counts[n - 1][d],
               "degree %u in %u variables: %u monomials", d, n, counts[n - 1][d]);
   batten_polynomial basis = batten_polynomial_basis(3, 2);
   T_CHECK(!memcmp(basis.exponent, order, sizeof order), "1, x, y, z, x^2, xy, xz, y^2, yz, z^2");
   basis = batten_polynomial_basis(2, 3);
-  T_CHECK(basis.exponent[6][0] == 3 && basis.exponent[7][0] == 2 && basis.exponent[7][1] == 1 && basis.exponent[9][1] == 3,
+  T_CHECK(basis.exponent[6][0] == 3 && basis.exponent[7][0] == 2 && basis.exponent[7][1] == 1 &&
+              basis.exponent[9][1] == 3,
           "cubic in the plane ends with x^3, x^2 y, x y^2, y^3");
 
   /* By hand: 1 + 2 x^2 y - 3 y z at (2, 3, 5). */

@@ -75,7 +75,7 @@ static double value_at(batten_context *ctx, const batten_spline *s, const double
   return v;
 }
 
-/* ---- what a fit promises ----------------------------------------------------------------------------------------- */
+/* ---- what a fit promises ---- */
 
 static void test_residuals(batten_context *ctx) {
   for (unsigned n = 1; n <= 3; n++)
@@ -101,7 +101,8 @@ static void test_residuals(batten_context *ctx) {
   printf("# N = 4000: %.2f s, %s\n", batten_now() - start, batten_saddle_method_name(info.saddle.method));
   T_RATIO(info.residual_max, 1e-10, "n = 3, m = 2, N = 4000: residual");
   double worst = 0;
-  for (size_t i = 0; i < c.count; i += 37) worst = fmax(worst, fabs(value_at(ctx, s, c.points + 3 * i) - c.values[i]));
+  for (size_t i = 0; i < c.count; i += 37)
+    worst = fmax(worst, fabs(value_at(ctx, s, c.points + 3 * i) - c.values[i]));
   T_RATIO(worst, 1e-10 * 2.4, "the same, point by point");
   batten_spline_free(s);
   free_cloud(&c);
@@ -195,13 +196,14 @@ static void test_hermite(batten_context *ctx) {
           largest = fmax(largest, fabs(some[q * n + a]));
         }
       }
-      T_RATIO(worst / largest, 1e-9, "n = %u, m = %u: %d gradients of %zu points, box of side 100", n, m, (int)SOME, c.count);
+      T_RATIO(worst / largest, 1e-9, "n = %u, m = %u: %d gradients of %zu points, box of side 100", n, m, (int)SOME,
+              c.count);
       batten_spline_free(s);
       free_cloud(&c);
     }
 }
 
-/* ---- a second route ---------------------------------------------------------------------------------------------- */
+/* ---- a second route ---- */
 
 /* n = 1, m = 2 is the natural cubic spline. Its second derivatives M solve
  * h_{i-1} M_{i-1} + 2 (h_{i-1} + h_i) M_i + h_i M_{i+1} = 6 (slope_i - slope_{i-1}), M_0 = M_{N-1} = 0. */
@@ -229,9 +231,10 @@ static void test_cubic(batten_context *ctx) {
   /* The 4th derivative of |x|^3 is 12 delta: the integral of U''^2 over the unit box is 12 w'Kw. */
   double bending = 0;
   for (int i = 0; i + 1 < N; i++)
-    bending += (x[i + 1] - x[i]) / 3 * (second[i] * second[i] + second[i] * second[i + 1] + second[i + 1] * second[i + 1]);
-  T_RATIO(fabs(12 * info.energy / (bending * pow(x[N - 1] - x[0], 3)) - 1), 1e-11, "energy %.6g is the bending energy",
-          info.energy);
+    bending +=
+        (x[i + 1] - x[i]) / 3 * (second[i] * second[i] + second[i] * second[i + 1] + second[i + 1] * second[i + 1]);
+  T_RATIO(fabs(12 * info.energy / (bending * pow(x[N - 1] - x[0], 3)) - 1), 1e-11,
+          "energy %.6g is the bending energy", info.energy);
   for (int i = 0; i + 1 < N; i++)
     for (double t = 0.125; t < 1; t += 0.25) {
       double h = x[i + 1] - x[i], at = x[i] + t * h, a = x[i + 1] - at, b = at - x[i], v, g, hessian;
@@ -259,7 +262,8 @@ static void test_linear(batten_context *ctx) {
   d.points = x;
   d.values = f;
   batten_spline *s = fit(ctx, &d, 1, 0, NULL);
-  for (int i = 0; i < 4; i++) T_RATIO(fabs(value_at(ctx, s, at + i) - want[i]), 1e-13, "polyline at %g: %g", at[i], want[i]);
+  for (int i = 0; i < 4; i++)
+    T_RATIO(fabs(value_at(ctx, s, at + i) - want[i]), 1e-13, "polyline at %g: %g", at[i], want[i]);
   batten_spline_free(s);
 }
 
@@ -273,7 +277,8 @@ static void test_loo(batten_context *ctx) {
     double each[40], sum = 0;
     for (int i = 0; i < 40; i++) each[i] = 0.001 * (1 + i % 5);
     batten_spline_data d = data_of(&c, hermite);
-    /* A point's gradient would stay when its value goes: leave out point 0 alone, gradients belong to the next five. */
+    /* A point's gradient would stay when its value goes: leave out point 0 alone, gradients belong to the next five.
+     */
     size_t next[5] = {1, 2, 3, 4, 5};
     if (hermite) d.gradient_count = 5, d.gradient_at = next, d.gradients = c.gradients + 3;
     batten_spline_options o = batten_spline_options_default();
@@ -318,20 +323,23 @@ static void test_loo(batten_context *ctx) {
     /* With smoothing the refit's own unit box differs a little where an extreme point is left out. */
     double allowed = run < 2 ? 1e-8 : 1e-3;
     T_RATIO(fabs(info.loo_rms / part - 1), allowed, "leave-one-out %.4g, by refits %.4g (%s)", info.loo_rms, part,
-            run == 0 ? "r" : run == 1 ? "with gradients" : run == 2 ? "smoothed" : "smoothed point by point");
+            run == 0   ? "r"
+            : run == 1 ? "with gradients"
+            : run == 2 ? "smoothed"
+                       : "smoothed point by point");
     T_CHECK(info.loo_samples == left, "of %zu points", info.loo_samples);
     free(points);
     free_cloud(&c);
   }
 }
 
-/* ---- invariances ------------------------------------------------------------------------------------------------- */
+/* ---- invariances ---- */
 
 enum { PROBES = 60 };
 
 /* U at fixed places of the cloud's box under x -> rotation x * scale + shift. */
-static void probe(batten_context *ctx, const cloud *c, unsigned m, const double rotation[9], double scale, double shift,
-                  const size_t *order, double out[PROBES]) {
+static void probe(batten_context *ctx, const cloud *c, unsigned m, const double rotation[9], double scale,
+                  double shift, const size_t *order, double out[PROBES]) {
   cloud moved = make_cloud(c->n, c->count, 1);
   batten_spline_data d = data_of(&moved, false);
   for (size_t i = 0; i < c->count; i++) {
@@ -376,8 +384,8 @@ static void test_invariance(batten_context *ctx) {
     double base[PROBES], other[PROBES];
     size_t order[200];
     for (size_t i = 0; i < 200; i++) order[i] = i * 77 % 200;
-    const double third = 1.0 / 3, rotation[9] = {2 * third, -third, 2 * third, 2 * third, 2 * third, -third,
-                                                 -third, 2 * third, 2 * third};
+    const double third = 1.0 / 3, rotation[9] = {2 * third, -third, 2 * third, 2 * third, 2 * third,
+                                                 -third,    -third, 2 * third, 2 * third};
     probe(ctx, &c, m, NULL, 1, 0, NULL, base);
     probe(ctx, &c, m, NULL, 0x1p40, 0, NULL, other);
     T_CHECK(difference(base, other) == 0, "m = %u: scaling by 2^40 changes no bit", m);
@@ -394,7 +402,7 @@ static void test_invariance(batten_context *ctx) {
   }
 }
 
-/* ---- smoothing --------------------------------------------------------------------------------------------------- */
+/* ---- smoothing ---- */
 
 static void test_smoothing(batten_context *ctx) {
   cloud c = make_cloud(2, 80, 12);
@@ -410,8 +418,8 @@ static void test_smoothing(batten_context *ctx) {
     largest = fmax(largest, fabs(gap));
   }
   T_RATIO(worst, 1e-12, "v - U = rho w");
-  T_CHECK(largest > 1e-4 && info.residual_max < 1e-12, "the smoothed spline misses by %.3g, its equations by %.1e", largest,
-          info.residual_max);
+  T_CHECK(largest > 1e-4 && info.residual_max < 1e-12, "the smoothed spline misses by %.3g, its equations by %.1e",
+          largest, info.residual_max);
   batten_spline_free(s);
 
   /* rho -> infinity: the least-squares plane, here from its 3 x 3 normal equations by Cramer's rule. */
@@ -433,7 +441,8 @@ static void test_smoothing(batten_context *ctx) {
                t[0][2] * (t[1][0] * t[2][1] - t[1][1] * t[2][0]);
   }
   double at[2] = {0.3, 0.8};
-  T_RATIO(fabs(value_at(ctx, s, at) - (x[1] + x[2] * at[0] + x[3] * at[1]) / x[0]), 1e-6, "rho = 1e9: least-squares plane");
+  T_RATIO(fabs(value_at(ctx, s, at) - (x[1] + x[2] * at[0] + x[3] * at[1]) / x[0]), 1e-6,
+          "rho = 1e9: least-squares plane");
   batten_spline_free(s);
 
   double each[80];
@@ -442,13 +451,14 @@ static void test_smoothing(batten_context *ctx) {
   o.smoothing = 7; /* must not count */
   o.smoothing_per_point = each;
   T_OK(batten_spline_fit(ctx, &d, &o, &s, NULL), ctx);
-  T_RATIO(fabs(value_at(ctx, s, c.points + 2 * 6) - c.values[6]), 1e-11, "smoothing of one point leaves the others interpolated");
+  T_RATIO(fabs(value_at(ctx, s, c.points + 2 * 6) - c.values[6]), 1e-11,
+          "smoothing of one point leaves the others interpolated");
   T_CHECK(fabs(value_at(ctx, s, c.points + 2 * 5) - c.values[5]) > 1e-5, "and lets that one go");
   batten_spline_free(s);
   free_cloud(&c);
 }
 
-/* ---- edges and bad input ----------------------------------------------------------------------------------------- */
+/* ---- edges and bad input ---- */
 
 static void test_edges(batten_context *ctx) {
   double x[15] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 2, 2, 2}, f[5] = {1, 2, 3, 4, 5};
@@ -524,7 +534,8 @@ static void test_bad_input(batten_context *ctx) {
   d.struct_size = 3;
   T_STATUS(batten_spline_fit(ctx, &d, NULL, &s, NULL), BATTEN_E_INVALID, ctx, "batten_spline_data.struct_size: 3");
   o.struct_size = 0;
-  T_STATUS(batten_spline_fit(ctx, &good, &o, &s, NULL), BATTEN_E_INVALID, ctx, "batten_spline_options.struct_size: 0");
+  T_STATUS(batten_spline_fit(ctx, &good, &o, &s, NULL), BATTEN_E_INVALID, ctx,
+           "batten_spline_options.struct_size: 0");
   o = defaults, o.saddle.struct_size = 1;
   T_STATUS(batten_spline_fit(ctx, &good, &o, &s, NULL), BATTEN_E_INVALID, ctx, "batten_saddle_options.struct_size");
   d = good, d.n = 0;
@@ -532,7 +543,8 @@ static void test_bad_input(batten_context *ctx) {
   d = good, d.n = 4;
   T_STATUS(batten_spline_fit(ctx, &d, NULL, &s, NULL), BATTEN_E_INVALID, ctx, "data.n: 4");
   o = defaults, o.m = 1;
-  T_STATUS(batten_spline_fit(ctx, &good, &o, &s, NULL), BATTEN_E_INVALID, ctx, "opt.m: 1; with n = 3 it must be 2 .. 4");
+  T_STATUS(batten_spline_fit(ctx, &good, &o, &s, NULL), BATTEN_E_INVALID, ctx,
+           "opt.m: 1; with n = 3 it must be 2 .. 4");
   o = defaults, o.m = 5;
   T_STATUS(batten_spline_fit(ctx, &good, &o, &s, NULL), BATTEN_E_INVALID, ctx, "opt.m: 5");
   o = defaults, o.smoothing = -1;
@@ -546,7 +558,8 @@ static void test_bad_input(batten_context *ctx) {
   d = good, d.count = 0;
   T_STATUS(batten_spline_fit(ctx, &d, NULL, &s, NULL), BATTEN_E_INVALID, ctx, "data.count: 0 points");
   d = good, d.count = 3;
-  T_STATUS(batten_spline_fit(ctx, &d, NULL, &s, NULL), BATTEN_E_INVALID, ctx, "3 points and 0 gradients give 3 conditions");
+  T_STATUS(batten_spline_fit(ctx, &d, NULL, &s, NULL), BATTEN_E_INVALID, ctx,
+           "3 points and 0 gradients give 3 conditions");
   d = good, d.count = SIZE_MAX / 8;
   T_STATUS(batten_spline_fit(ctx, &d, NULL, &s, NULL), BATTEN_E_TOO_LARGE, ctx, "data.count");
   d = good, d.gradient_count = 5;
@@ -572,7 +585,8 @@ static void test_bad_input(batten_context *ctx) {
   T_STATUS(batten_spline_fit(ctx, &good, NULL, &s, NULL), BATTEN_E_INVALID, ctx, "values: range 1e+200");
   c.values[3] = 0;
   c.points[0] = 1e200;
-  T_STATUS(batten_spline_fit(ctx, &good, NULL, &s, NULL), BATTEN_E_INVALID, ctx, "longest side of their box is 1e+200");
+  T_STATUS(batten_spline_fit(ctx, &good, NULL, &s, NULL), BATTEN_E_INVALID, ctx,
+           "longest side of their box is 1e+200");
   c.points[0] = 0.25;
   memcpy(c.points + 3 * 40, c.points + 3 * 11, 3 * sizeof(double));
   memcpy(c.points + 3 * 30, c.points + 3 * 12, 3 * sizeof(double));
@@ -604,13 +618,15 @@ static void test_flat(batten_context *ctx) {
       double u = 100 * t_uniform(&seed);
       x[3 * i] = u + shift, x[3 * i + 1] = u / 3 + shift, x[3 * i + 2] = -u / 7 + shift;
     }
-    T_STATUS(batten_spline_fit(ctx, &d, NULL, &s, NULL), BATTEN_E_SINGULAR, ctx, "on a line with direction (0.940089, 0.313363, -0.134298)");
+    T_STATUS(batten_spline_fit(ctx, &d, NULL, &s, NULL), BATTEN_E_SINGULAR, ctx,
+             "on a line with direction (0.940089, 0.313363, -0.134298)");
     d.n = 2, d.count = 30;
     for (int i = 0; i < 30; i++) {
       double u = 100 * t_uniform(&seed);
       x[2 * i] = 0.6 * u + shift, x[2 * i + 1] = 0.8 * u + shift;
     }
-    T_STATUS(batten_spline_fit(ctx, &d, NULL, &s, NULL), BATTEN_E_SINGULAR, ctx, "on a line with direction (0.6, 0.8)");
+    T_STATUS(batten_spline_fit(ctx, &d, NULL, &s, NULL), BATTEN_E_SINGULAR, ctx,
+             "on a line with direction (0.6, 0.8)");
     d.n = 3;
   }
   /* On a sphere, which is a zero set of the quadratics that m = 3 has. */
@@ -620,12 +636,13 @@ static void test_flat(batten_context *ctx) {
   }
   batten_spline_options o = batten_spline_options_default();
   o.m = 3;
-  T_STATUS(batten_spline_fit(ctx, &d, &o, &s, NULL), BATTEN_E_SINGULAR, ctx, "zero set of one polynomial of degree 2");
+  T_STATUS(batten_spline_fit(ctx, &d, &o, &s, NULL), BATTEN_E_SINGULAR, ctx,
+           "zero set of one polynomial of degree 2");
   o.m = 2;
   T_OK(batten_spline_fit(ctx, &d, &o, &s, NULL), ctx);
   batten_spline_free(s);
-  /* Four points in a plane are as many as the monomials. Gradients do not make up for being flat: m is 3 then, and the
-   * square of the plane's equation has neither value nor gradient on it. */
+  /* Four points in a plane are as many as the monomials. Gradients do not make up for being flat: m is 3 then, and
+   * the square of the plane's equation has neither value nor gradient on it. */
   double square[15] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0, 2, 3, 0}, up[15], zero[5] = {0};
   for (int i = 0; i < 15; i++) up[i] = i % 3 == 2;
   d.count = 4, d.points = square, d.values = zero;
@@ -651,8 +668,8 @@ static void test_bytes(void) {
     batten_spline *s = fit(ctx, &d, hermite ? 3 : 2, 0, &info);
     double ratio = (double)batten_bytes_peak(ctx) /
                    (double)batten_spline_bytes(info.saddle.method, 3, hermite ? 3 : 2, c.count, d.gradient_count);
-    T_CHECK(ratio <= 1 && ratio > 0.5, "predicted bytes (%s): peak is %.3f of them", batten_saddle_method_name(info.saddle.method),
-            ratio);
+    T_CHECK(ratio <= 1 && ratio > 0.5, "predicted bytes (%s): peak is %.3f of them",
+            batten_saddle_method_name(info.saddle.method), ratio);
     batten_spline_free(s);
     T_CHECK(batten_bytes_in_use(ctx) == 0, "nothing stays");
     free_cloud(&c);

@@ -1,5 +1,5 @@
-/* Evaluation of volume splines: against a scalar reference in long double, differences, itself in other batches, on other
- * threads and instruction sets. The splines are made from random parts. */
+/* Evaluation of volume splines: against a scalar reference in long double, differences, itself in other batches, on
+ * other threads and instruction sets. The splines are made from random parts. */
 #include "basis/green.h"
 #include "basis/polynomial.h"
 #include "spline/inner.h"
@@ -47,7 +47,7 @@ static void make_scene(scene *s, unsigned n, unsigned m, uint64_t seed) {
                                    .scale = 8};
 }
 
-/* ---- the reference: straight from the formula, in long double ---------------------------------------------------- */
+/* ---- the reference: straight from the formula, in long double ---- */
 
 static void radial(unsigned power, long double r, long double f[4]) {
   long double a = power % 2 ? 0 : 1, b = power % 2 ? 1 : 0;
@@ -87,7 +87,8 @@ static jet reference(const batten_spline_parts *p, const double *x) {
       for (unsigned a = 0; a < n; a++) {
         out.g[a] -= g * (f[1] * (a == c) + f[2] * d[a] * d[c]);
         for (unsigned b = 0; b < n; b++)
-          out.h[a][b] -= g * (f[2] * ((a == b) * d[c] + (a == c) * d[b] + (b == c) * d[a]) + f[3] * d[a] * d[b] * d[c]);
+          out.h[a][b] -=
+              g * (f[2] * ((a == b) * d[c] + (a == c) * d[b] + (b == c) * d[a]) + f[3] * d[a] * d[b] * d[c]);
       }
     }
     q++;
@@ -187,7 +188,7 @@ static void test_differences(batten_context *ctx, unsigned n, unsigned m) {
   batten_spline_free(s);
 }
 
-/* ---- same bits --------------------------------------------------------------------------------------------------- */
+/* ---- same bits ---- */
 
 static void test_batches(unsigned n, unsigned m) {
   static scene sc;
@@ -257,8 +258,13 @@ static void test_instruction_sets(void) {
         make_scene(&sc, n, m, 9);
         const double *x = sc.coefficients, *y = sc.polynomial;
         const size_t hermite = sc.parts.gradient_count;
-        spline_terms t = {.n = n, .power = 2 * m - n, .plain = CENTRES - 30 - hermite, .hermite = hermite,
-                          .x = {x, x + 10, x + 20}, .w = x + 30, .g = {x + 7, x + 3, x}};
+        spline_terms t = {.n = n,
+                          .power = 2 * m - n,
+                          .plain = CENTRES - 30 - hermite,
+                          .hermite = hermite,
+                          .x = {x, x + 10, x + 20},
+                          .w = x + 30,
+                          .g = {x + 7, x + 3, x}};
         for (unsigned order = 0; order < 3; order++) {
           double at[3][SPLINE_LANES], a[SPLINE_SUMS][SPLINE_LANES] = {{0}}, b[SPLINE_SUMS][SPLINE_LANES] = {{0}};
           for (unsigned i = 0; i < SPLINE_LANES; i++)
@@ -270,14 +276,29 @@ static void test_instruction_sets(void) {
         for (int r = -1; r < (hermite ? (int)n : 0); r++)
           for (int c = -1; c < (hermite ? (int)n : 0); c++) {
             double a[19 * 11], b[19 * 11], mirror[19 * 11];
-            spline_tile tile = {.n = n, .power = 2 * m - n, .row_axis = r, .col_axis = c, .rows = 19, .cols = 11,
-                                .row_x = {x, x + 20, x + 40}, .col_x = {x + 60, x + 80, x + 100}, .tile = a, .ld = 19};
+            spline_tile tile = {.n = n,
+                                .power = 2 * m - n,
+                                .row_axis = r,
+                                .col_axis = c,
+                                .rows = 19,
+                                .cols = 11,
+                                .row_x = {x, x + 20, x + 40},
+                                .col_x = {x + 60, x + 80, x + 100},
+                                .tile = a,
+                                .ld = 19};
             code->tile(&tile);
             tile.tile = b;
             baseline->tile(&tile);
             tiles = tiles && !memcmp(a, b, sizeof a);
-            tile = (spline_tile){.n = n, .power = 2 * m - n, .row_axis = c, .col_axis = r, .rows = 11, .cols = 19,
-                                 .row_x = {x + 60, x + 80, x + 100}, .col_x = {x, x + 20, x + 40}, .tile = mirror,
+            tile = (spline_tile){.n = n,
+                                 .power = 2 * m - n,
+                                 .row_axis = c,
+                                 .col_axis = r,
+                                 .rows = 11,
+                                 .cols = 19,
+                                 .row_x = {x + 60, x + 80, x + 100},
+                                 .col_x = {x, x + 20, x + 40},
+                                 .tile = mirror,
                                  .ld = 11};
             code->tile(&tile);
             for (int i = 0; i < 19; i++)
@@ -289,19 +310,26 @@ static void test_instruction_sets(void) {
   }
 }
 
-/* ---- edges ------------------------------------------------------------------------------------------------------- */
+/* ---- edges ---- */
 
 static void test_edges(batten_context *ctx) {
   /* One centre, -r with weight 2 in the unit box of side 4: U = -2 |x - c| / 4 + 7. */
-  batten_spline_parts p = {.struct_size = sizeof p, .n = 3, .m = 2, .count = 1, .centers = (double[]){1, 2, 3},
-                           .coefficients = (double[]){2}, .polynomial_count = 4, .polynomial = (double[]){7, 0, 0, 0},
-                           .origin = {1, 2, 3}, .scale = 4};
+  batten_spline_parts p = {.struct_size = sizeof p,
+                           .n = 3,
+                           .m = 2,
+                           .count = 1,
+                           .centers = (double[]){1, 2, 3},
+                           .coefficients = (double[]){2},
+                           .polynomial_count = 4,
+                           .polynomial = (double[]){7, 0, 0, 0},
+                           .origin = {1, 2, 3},
+                           .scale = 4};
   batten_spline *s = NULL;
   T_OK(batten_spline_create(ctx, &p, &s), ctx);
   double v[3], g[9], h[27], x[9] = {1, 2, 7, 1, 2, 3, NAN, 0, 0};
   T_OK(batten_spline_evaluate(ctx, s, 3, x, v, g, h), ctx);
-  T_CHECK(v[0] == 5 && g[0] == 0 && g[1] == 0 && g[2] == -0.5, "one centre by hand: %g, gradient %g %g %g", v[0], g[0],
-          g[1], g[2]);
+  T_CHECK(v[0] == 5 && g[0] == 0 && g[1] == 0 && g[2] == -0.5, "one centre by hand: %g, gradient %g %g %g", v[0],
+          g[0], g[1], g[2]);
   T_CHECK(h[0] == -0.125 && h[4] == -0.125 && h[8] == 0, "its Hessian: -1/8, -1/8, 0");
   T_CHECK(v[1] == 7 && g[3] == 0 && g[5] == 0 && h[9] == 0, "at the centre its term is 0, and its derivatives are");
   T_CHECK(isnan(v[2]) && isnan(g[6]) && isnan(g[8]) && isnan(h[26]), "NaN in, NaN out, in every number");
@@ -310,7 +338,8 @@ static void test_edges(batten_context *ctx) {
   T_STATUS(batten_spline_evaluate(ctx, s, 3, NULL, v, NULL, NULL), BATTEN_E_INVALID, ctx, "points: NULL");
   T_STATUS(batten_spline_evaluate(ctx, NULL, 3, x, v, NULL, NULL), BATTEN_E_INVALID, ctx, "s: NULL");
   T_CHECK(batten_spline_evaluate(NULL, s, 3, x, v, NULL, NULL) == BATTEN_E_INVALID &&
-              batten_spline_create(NULL, &p, &s) == BATTEN_E_INVALID, "no context is refused");
+              batten_spline_create(NULL, &p, &s) == BATTEN_E_INVALID,
+          "no context is refused");
   batten_field f = batten_spline_field(s);
   T_OK(f.evaluate(f.user, ctx, 1, x, v, NULL, NULL), ctx);
   T_CHECK(f.dimension == 3 && f.order == 2 && v[0] == 5, "as a field");
@@ -379,9 +408,15 @@ static batten_status create_once(batten_context *ctx, void *arg) {
 enum { LONG_CENTRES = 20000, LONG_POINTS = 7000 };
 static batten_status evaluate_long(batten_context *ctx, void *arg) {
   double *x = arg, *values = x + 3 * LONG_CENTRES + LONG_CENTRES;
-  batten_spline_parts p = {.struct_size = sizeof p, .n = 3, .m = 2, .count = LONG_CENTRES, .centers = x,
-                           .coefficients = x + 3 * LONG_CENTRES, .polynomial_count = 4,
-                           .polynomial = (double[]){0, 0, 0, 0}, .scale = 1};
+  batten_spline_parts p = {.struct_size = sizeof p,
+                           .n = 3,
+                           .m = 2,
+                           .count = LONG_CENTRES,
+                           .centers = x,
+                           .coefficients = x + 3 * LONG_CENTRES,
+                           .polynomial_count = 4,
+                           .polynomial = (double[]){0, 0, 0, 0},
+                           .scale = 1};
   batten_spline *s = NULL;
   batten_status st = batten_spline_create(ctx, &p, &s);
   if (st == BATTEN_OK) st = batten_spline_evaluate(ctx, s, LONG_POINTS, x, values, NULL, NULL);

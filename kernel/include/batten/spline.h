@@ -65,8 +65,8 @@ BATTEN_API size_t batten_spline_bytes(batten_saddle_method method, unsigned n, u
 /* Fits; *out is freed by batten_spline_free and untouched on failure; info may be NULL.
  * Positive status: BATTEN_W_ACCURACY when residual_max or gradient_residual_max is above 1e-10.
  * Fails: INVALID (2m <= n, non-finite, equal points: names both, fewer conditions than monomials), TOO_LARGE, NOMEM,
- * SINGULAR (points on a line or plane: names it; or nearly on one another or on the zero set of a polynomial of degree
- * m-1), CANCELLED. Time O((N + nM)^3 / 3). */
+ * SINGULAR (points on a line or plane: names it; or nearly on one another or on the zero set of a polynomial of
+ * degree m-1), CANCELLED. Time O((N + nM)^3 / 3). */
 BATTEN_API batten_status batten_spline_fit(batten_context *ctx, const batten_spline_data *data,
                                            const batten_spline_options *opt, batten_spline **out,
                                            batten_spline_info *info);
@@ -82,7 +82,8 @@ typedef struct batten_spline_parts {
   const size_t *gradient_at; /* [M] increasing */
   const double *gradient_coefficients; /* [M][n] */
   size_t polynomial_count;   /* k = C(n+m-1, n) */
-  const double *polynomial;  /* [k] for the unit box; monomials by degree: 1, x, y, z, x^2, xy, xz, y^2, yz, z^2, ... */
+  const double *polynomial;  /* [k] for the unit box; monomials by degree: 1, x, y, z, x^2, xy, xz, y^2, yz, z^2,
+                                x^3, x^2 y, ... */
   double origin[3];          /* unit box coordinate = (x - origin) / scale */
   double scale;
 } batten_spline_parts;
