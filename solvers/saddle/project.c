@@ -287,6 +287,8 @@ batten_status batten_saddle_project_factor(batten_saddle *s, batten_la_real real
   if (!sums) goto done;
   double norm = batten_rfp_norm1(&b22, sums);
   st = batten_rfp_cholesky(s->ctx, &b22, &failed);
+  if (st == BATTEN_E_SINGULAR) /* rows below the first k keep their place in the projection */
+    batten_fail(s->ctx, st, "matrix: not positive definite at row %zu", k + failed - 1);
   if (st < 0) goto done;
   batten_free(s->ctx, sums);
   sums = NULL;

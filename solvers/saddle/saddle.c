@@ -68,11 +68,11 @@ static batten_saddle_method first_method(const batten_saddle *s) {
 
 static batten_status too_large(const batten_saddle *s, batten_saddle_method method, const char *reason) {
   return batten_fail(s->ctx, BATTEN_E_TOO_LARGE,
-                     "matrix.n: %zu rows by %s take %zu bytes, the context allows %zu%s%s; raise memory_limit, use fewer "
-                     "points or method cholesky-mixed",
+                     "matrix.n: %zu rows by %s take %zu bytes, the context allows %zu%s%s; raise memory_limit or use fewer "
+                     "points%s",
                      s->matrix.n, batten_saddle_method_name(method),
-                     batten_saddle_bytes(method, s->matrix.n, s->matrix.k), allowed_bytes(s), *reason ? ", and " : "",
-                     reason);
+                     batten_saddle_bytes(method, s->matrix.n, s->matrix.k), allowed_bytes(s), *reason ? ", since " : "", reason,
+                     method == BATTEN_SADDLE_CHOLESKY_MIXED || *reason ? "" : ", or method cholesky-mixed");
 }
 
 /* The method to try after `method`; AUTO when there is none. */
@@ -116,8 +116,8 @@ static batten_status factor_from(batten_saddle *s, batten_saddle_method method) 
     if (st != BATTEN_E_SINGULAR || next == BATTEN_SADDLE_AUTO) return st;
     if (!fits(s, next)) {
       if (method == BATTEN_SADDLE_CHOLESKY_MIXED) return too_large(s, next, batten_error(s->ctx));
-      return batten_fail(s->ctx, BATTEN_E_SINGULAR, "%s; merge duplicate points or check the kernel's sign",
-                         batten_error(s->ctx));
+      return batten_fail(s->ctx, BATTEN_E_SINGULAR, "%s; merge duplicate points or check the kernel's sign (ldl, which "
+                         "could say more, does not fit)", batten_error(s->ctx));
     }
     s->info.fallbacks++;
     method = next;
