@@ -77,7 +77,7 @@ static inline void scene_points(scene_type type, size_t n, uint64_t *seed, doubl
   }
 }
 
-/* k = 4: linear polynomials; 1: constants; 0: none. */
+/* k = 4: linear polynomials; 1: constants; 0: none; above 4 the caller fills the rest of P. */
 static inline scene scene_new(scene_type type, scene_kernel kernel, size_t n, size_t k, uint64_t seed) {
   scene s = {.n = n, .k = k, .kernel = kernel, .factor = 1};
   s.x = malloc((3 * n + 1) * sizeof *s.x);
@@ -85,7 +85,7 @@ static inline scene scene_new(scene_type type, scene_kernel kernel, size_t n, si
   s.f = malloc((n + 1) * sizeof *s.f);
   scene_points(type, n, &seed, s.x);
   for (size_t i = 0; i < n; i++) {
-    for (size_t c = 0; c < k; c++) s.p[i + c * n] = c == 0 ? 1 : s.x[3 * i + c - 1];
+    for (size_t c = 0; c < k; c++) s.p[i + c * n] = c == 0 ? 1 : c < 4 ? s.x[3 * i + c - 1] : 0;
     s.f[i] = 2 * t_uniform(&seed) - 1;
   }
   return s;
