@@ -130,13 +130,17 @@ static void write_stl(bx_writer *w, const batten_mesh *mesh) {
   bx_put(w, head, sizeof head);
   bx_put_u32(w, (uint32_t)batten_mesh_triangle_count(mesh));
   for (size_t i = 0; i < batten_mesh_triangle_count(mesh); i++) {
-    double normal[3];
-    const double *corner[3];
-    for (int c = 0; c < 3; c++) corner[c] = x + 3 * (size_t)t[3 * i + (size_t)c];
-    facet_normal(corner[0], corner[1], corner[2], normal);
+    float corners[3][3];
+    double rounded[3][3], normal[3]; /* the normal of the triangle that the file holds */
+    for (int c = 0; c < 3; c++)
+      for (int k = 0; k < 3; k++) {
+        corners[c][k] = (float)x[3 * (size_t)t[3 * i + (size_t)c] + (size_t)k];
+        rounded[c][k] = (double)corners[c][k];
+      }
+    facet_normal(rounded[0], rounded[1], rounded[2], normal);
     for (int k = 0; k < 3; k++) bx_put_f32(w, (float)normal[k]);
     for (int c = 0; c < 3; c++)
-      for (int k = 0; k < 3; k++) bx_put_f32(w, (float)corner[c][k]);
+      for (int k = 0; k < 3; k++) bx_put_f32(w, corners[c][k]);
     bx_put_u16(w, 0);
   }
 }
