@@ -74,9 +74,9 @@ static batten_status gradients_at_data(batten_context *ctx, const surface_data *
   size_t n = d->n, count = d->count;
   double *length = batten_alloc_array(ctx, count, 2 * sizeof *length), *sorted = length ? length + count : NULL;
   double *probe = batten_alloc_array(ctx, count, 2 * n * sizeof *probe);
-  double *f = batten_alloc_array(ctx, count, 2 * sizeof *f);
+  double *f = batten_alloc_array(ctx, count, 3 * sizeof *f), *at = f ? f + 2 * count : NULL;
   batten_status st = length && probe && f ? BATTEN_OK : BATTEN_E_NOMEM;
-  if (st >= 0) st = batten_solid_evaluate(ctx, s, count, d->points, NULL, unit, NULL);
+  if (st >= 0) st = batten_solid_evaluate(ctx, s, count, d->points, at, unit, NULL);
   if (st < 0) goto done;
   for (size_t i = 0; i < count; i++) sorted[i] = length[i] = sqrt(dot(n, unit + i * n, unit + i * n));
   qsort(sorted, count, sizeof *sorted, compare_doubles);
@@ -94,7 +94,7 @@ static batten_status gradients_at_data(batten_context *ctx, const surface_data *
   if (st < 0) goto done;
   *weak = 0;
   for (size_t i = 0; i < count; i++) {
-    if (length[i] > least && f[2 * i] > 0 && f[2 * i + 1] < 0) continue;
+    if (length[i] > least && f[2 * i] > at[i] && f[2 * i + 1] < at[i]) continue; /* at: 0 but for smoothing */
     (*weak)++;
     for (size_t k = 0; k < n; k++) unit[i * n + k] = 0;
   }
