@@ -1,0 +1,127 @@
+/* Every reader on arbitrary bytes. Whatever they are: a status with a text or a whole result, finite numbers, indices
+ * in range, nothing left in memory, and no more memory than the bytes can account for. */
+#include "fuzz.h"
+
+#include "format.h"
+
+#include <math.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+
+enum { MEMORY_LIMIT = 1 << 28 };
+
+static const char *check_failure(batten_context *ctx, batten_status st) {
+  if (st != BATTEN_E_FORMAT && st != BATTEN_E_TOO_LARGE && st != BATTEN_E_NOMEM) return "a status that none expects";
+  return *batten_error(ctx) ? NULL : "a failure without a text";
+}
+
+static const char *check_cloud(const batten_cloud *c) {
+  if (c->count == 0 || (c->n != 2 && c->n != 3)) return "a cloud without points or dimension";
+  for (size_t i = 0; i < c->count * c->n; i++) {
+    if (!isfinite(c->points[i])) return "a point that is not finite";
+    if (c->normals && !isfinite(c->normals[i])) return "a normal that is not finite";
+  }
+  return NULL;
+}
+
+static const char *check_mesh(const batten_mesh *m) {
+  size_t vertices = batten_mesh_vertex_count(m), triangles = batten_mesh_triangle_count(m);
+  for (size_t i = 0; i < 3 * triangles; i++)
+    if (batten_mesh_triangles(m)[i] >= vertices) return "a corner that is no vertex";
+  for (size_t i = 0; i < 3 * vertices; i++)
+    if (!isfinite(batten_mesh_vertices(m)[i])) return "a vertex that is not finite";
+  return triangles ? NULL : "a mesh without triangles";
+}
+
+static const char *read_points(bx_reader *r, bx_format format, unsigned n) {
+  batten_cloud cloud = {0};
+  batten_status st = bx_read_points_from(r, format, n, &cloud);
+  if (st != BATTEN_OK) return cloud.points ? "a result in spite of a failure" : check_failure(r->ctx, st);
+  const char *wrong = check_cloud(&cloud);
+  batten_cloud_free(r->ctx, &cloud);
+  return wrong;
+}
+
+static const char *read_mesh(bx_reader *r, bx_format format) {
+  batten_mesh *mesh = NULL;
+  batten_status st = bx_read_mesh_from(r, format, &mesh);
+  if (st != BATTEN_OK) return mesh ? "a result in spite of a failure" : check_failure(r->ctx, st);
+  const char *wrong = check_mesh(mesh);
+  batten_mesh_free(mesh);
+  return wrong;
+}
+
+static const char *load_solid(bx_reader *r) {
+  batten_solid *solid = NULL;
+  batten_status st = bx_load_solid_from(r, &solid);
+  if (st != BATTEN_OK) return solid ? "a result in spite of a failure" : check_failure(r->ctx, st);
+  double x[3] = {0.25, 0.5, 0.75}, f, g[3], h[9];
+  st = batten_solid_evaluate(r->ctx, solid, 1, x, &f, g, h);
+  batten_solid_free(solid);
+  return st < 0 ? "a solid that cannot be evaluated" : NULL;
+}
+
+static const char *load_carrier(bx_reader *r) {
+  batten_carrier *carrier = NULL;
+  batten_status st = bx_load_carrier_from(r, &carrier);
+  if (st != BATTEN_OK) return carrier ? "a result in spite of a failure" : check_failure(r->ctx, st);
+  double x[3] = {0.25, 0.5, 0.75}, f, g[3], h[9];
+  st = batten_carrier_evaluate(r->ctx, carrier, 1, x, &f, g, h);
+  batten_carrier_free(carrier);
+  return st < 0 ? "a carrier that cannot be evaluated" : NULL;
+}
+
+/* The readers of a format, by number; false when there are no more. */
+static bool read_once(bx_reader *r, bx_format format, unsigned which, const char **wrong) {
+  *wrong = NULL;
+  if (format == BX_JSON) {
+    if (which > 1) return false;
+    *wrong = which == 0 ? load_solid(r) : load_carrier(r);
+    return true;
+  }
+  if (which == 3 && format != BX_TEXT) *wrong = read_mesh(r, format);
+  else if (which < 3) *wrong = read_points(r, format, which ? which + 1 : 0);
+  else return false;
+  return true;
+}
+
+const char *fuzz_read(const char *name, const unsigned char *data, size_t size) {
+  batten_context_options o = batten_context_options_default();
+  o.memory_limit = MEMORY_LIMIT;
+  batten_context *ctx = NULL;
+  if (batten_context_new(&o, &ctx) != BATTEN_OK) return NULL;
+  const char *wrong = NULL;
+  bool gz = size >= 2 && data[0] == 0x1f && data[1] == 0x8b, more = true, named;
+  bx_format format = bx_format_of(name, &named);
+  for (unsigned which = 0; more && !wrong; which++) {
+    bx_reader r;
+    batten_status st = bx_open_memory(&r, ctx, name, data, size);
+    if (st != BATTEN_OK) {
+      wrong = check_failure(ctx, st);
+      break;
+    }
+    more = read_once(&r, format, which, &wrong);
+    bx_close(&r);
+    if (!wrong && batten_bytes_in_use(ctx)) wrong = "memory is left";
+    /* 400: a byte of text can be a corner that takes a triangle's 12, twice while it grows, and a slot's share */
+    if (!wrong && !gz && batten_bytes_peak(ctx) > (1 << 19) + 400 * size) wrong = "more memory than the bytes account for";
+  }
+  batten_context_free(ctx);
+  return wrong;
+}
+
+#ifdef FUZZ_NAME
+#include <stdlib.h>
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
+  const char *wrong = fuzz_read(FUZZ_NAME, data, size);
+  if (wrong) {
+    fprintf(stderr, "%s: %s\n", FUZZ_NAME, wrong);
+    abort();
+  }
+  return 0;
+}
+#endif
