@@ -82,11 +82,40 @@ static bool segment_meets(const double *p, const double *q, const double *const 
   return !(positive && negative);
 }
 
-/* Triangles on the edge a b with tips c and d: they overlap when they are folded flat onto each other. */
+/* Triangles on the edge a b with tips c and d: they overlap when they are folded flat onto each other. Plain doubles
+ * tell when they are far from that: the tips, seen from the edge, are more than 26 degrees apart. */
 static bool folded(const double *a, const double *b, const double *c, const double *d) {
+  double e[3], u[3], v[3];
+  vec_sub(b, a, e);
+  vec_sub(c, a, u);
+  vec_sub(d, a, v);
+  double ee = vec_dot(e, e), along_u = vec_dot(u, e) / ee, along_v = vec_dot(v, e) / ee;
+  for (int k = 0; k < 3; k++) {
+    u[k] -= along_u * e[k];
+    v[k] -= along_v * e[k];
+  }
+  double uv = vec_dot(u, v), uu = vec_dot(u, u), vv = vec_dot(v, v), size = vec_dot(c, c) + vec_dot(d, d);
+  /* Sides that rounding could have made are left to the exact test. */
+  bool certain = uu > 1e-20 * size && vv > 1e-20 * size && ee > 1e-20 * size;
+  if (certain && (uv <= 0 || uv * uv < 0.8 * uu * vv)) return false;
   if (batten_orient3d(a, b, c, d) != 0) return false;
   int x, y, side = projection(a, b, c, &x, &y);
   return batten_orient2d(a, b, d, x, y) == side;
+}
+
+/* Triangles at a with far edges b c and d e: does the plane across the difference of their directions part them? Then
+ * they share a alone. Plain doubles, with a margin far above rounding; no is no answer. */
+static bool parted(const double *a, const double *b, const double *c, const double *d, const double *e) {
+  const double *ends[4] = {b, c, d, e};
+  double u[4][3], n[3] = {0, 0, 0};
+  for (int i = 0; i < 4; i++) {
+    vec_sub(ends[i], a, u[i]);
+    if (!vec_normalize(u[i])) return false;
+    for (int k = 0; k < 3; k++) n[k] += i < 2 ? u[i][k] : -u[i][k];
+  }
+  for (int i = 0; i < 4; i++)
+    if (!((i < 2 ? 1 : -1) * vec_dot(n, u[i]) > 1e-3)) return false;
+  return true;
 }
 
 static bool cross(const double *const *s, const double *const *t) {
@@ -107,6 +136,7 @@ static bool cross(const double *const *s, const double *const *t) {
     if (shared == 2 && partner[i] < 0) return folded(s[n], s[l], s[i], t[3 - partner[n] - partner[l]]);
     if (shared == 1 && partner[i] >= 0) {
       int j = partner[i];
+      if (parted(s[i], s[n], s[l], t[(j + 1) % 3], t[(j + 2) % 3])) return false;
       return segment_meets(s[n], s[l], t) || segment_meets(t[(j + 1) % 3], t[(j + 2) % 3], s);
     }
     if (shared == 0 && (segment_meets(s[i], s[n], t) || segment_meets(t[i], t[n], s))) return true;

@@ -13,7 +13,7 @@
 static const double BOX_MARGIN = 0.25;                      /* of the seeds' largest extent, on every side */
 static const double CELL_SPACING = 0.7;                     /* of the median distance between neighbouring seeds */
 static const double CELL_LARGEST = 1.0 / 30, CELL_SMALLEST = 1.0 / 200; /* of the diagonal of the seeds' box */
-static const double CUBE_EDGES = 1.5; /* lattice cubes are wider than the edges: they give 2.5 vertices for each */
+static const double CUBE_EDGES = 1.25; /* lattice cubes are wider than the edges: they give 3.6 vertices for each */
 
 batten_polygonize_options batten_polygonize_options_default(void) {
   return (batten_polygonize_options){
@@ -156,30 +156,54 @@ batten_status batten_polygonize_warn(batten_context *ctx, const batten_polygoniz
     return batten_fail(ctx, BATTEN_W_ACCURACY,
                        "accuracy: vertices lie up to %g off f = 0, %g allowed; the field may not be smooth there",
                        info->distance_max, tolerance);
+  if (info->self_intersections)
+    return batten_fail(ctx, BATTEN_W_ACCURACY,
+                       "the surface crosses itself at %zu pairs of triangles; make opt.cell smaller than %g, or "
+                       "opt.improve larger than 0",
+                       info->self_intersections, info->cell);
   if (info->clipped)
     return batten_fail(ctx, BATTEN_W_CLIPPED, "the surface reaches its box and is cut there; enlarge opt.lower and "
                        "opt.upper for all of it");
   return BATTEN_OK;
 }
 
+/* One attempt: *surface is a mesh with edges of about `edge`, from a lattice of cubes with the side `cube`. */
+static batten_status attempt(batten_sampler *sampler, const batten_frame *frame, double cube, double edge,
+                             size_t seed_count, const double *seeds, const batten_polygonize_options *opt,
+                             batten_surface *surface, batten_polygonize_info *info) {
+  batten_rough_surface rough = {0};
+  double start = batten_now();
+  batten_status st = batten_track_surface(sampler, frame->lower, frame->upper, cube, seed_count, seeds, &rough);
+  info->time_track_s += batten_now() - start;
+  if (st < 0) return st;
+  start = batten_now();
+  info->cell = edge;
+  info->seeds_missed = rough.seeds_missed;
+  info->clipped = 0;
+  for (size_t v = 0; v < rough.vertex_count; v++) info->clipped = info->clipped || rough.faces[v];
+  st = batten_surface_build(sampler->ctx, &rough, surface);
+  if (st >= 0) st = batten_surface_improve(surface, sampler, edge, opt->improve);
+  if (st >= 0) st = batten_surface_settle(surface, sampler, edge, opt->accuracy * frame->diagonal, &info->distance_max);
+  if (st >= 0)
+    st = batten_mesh_find_crossings(sampler->ctx, surface->vertex_count, surface->points, surface->triangle_count,
+                                    surface->origin, NULL, &info->self_intersections);
+  info->time_improve_s += batten_now() - start;
+  return st;
+}
+
+/* A surface that crosses itself has parts too thin for the lattice: again with cubes of half the side, and at last
+ * with shorter edges too. */
 static batten_status make_surface(batten_sampler *sampler, const batten_frame *frame, size_t seed_count,
                                   const double *seeds, const batten_polygonize_options *opt, batten_surface *surface,
                                   batten_polygonize_info *info) {
-  batten_rough_surface rough = {0};
-  double start = batten_now();
-  batten_status st = batten_track_surface(sampler, frame->lower, frame->upper, CUBE_EDGES * frame->cell, seed_count,
-                                          seeds, &rough);
-  if (st < 0) return st;
-  info->seeds_missed = rough.seeds_missed;
-  for (size_t v = 0; v < rough.vertex_count; v++) info->clipped = info->clipped || rough.faces[v];
-  st = batten_surface_build(sampler->ctx, &rough, surface);
-  if (st < 0) return st;
-  double tracked = batten_now();
-  info->time_track_s = tracked - start;
-  st = batten_surface_improve(surface, sampler, frame->cell, opt->improve);
-  if (st >= 0)
-    st = batten_surface_settle(surface, sampler, frame->cell, opt->accuracy * frame->diagonal, &info->distance_max);
-  info->time_improve_s = batten_now() - tracked;
+  static const double cube_share[] = {1, 0.5, 0.25}, edge_share[] = {1, 1, 0.5};
+  batten_status st = BATTEN_OK;
+  for (size_t i = 0; i < sizeof cube_share / sizeof *cube_share; i++) {
+    batten_surface_free(surface);
+    st = attempt(sampler, frame, CUBE_EDGES * cube_share[i] * frame->cell, edge_share[i] * frame->cell, seed_count,
+                 seeds, opt, surface, info);
+    if (st < 0 || info->self_intersections == 0 || opt->improve == 0) break;
+  }
   return st;
 }
 

@@ -88,17 +88,26 @@ static double offset_of(int j, double reach) {
   return j == 0 ? 0 : ldexp(j % 2 ? reach : -reach, (j - 1) / 2 - (BRACKETS - 1));
 }
 
+/* Where to look for the surface: along the gradient, or the outward direction that the caller has, on the faces. */
+static void search_direction(const work *w, size_t i, const unsigned char *faces, const double *outward, double *d) {
+  unsigned n = w->n;
+  for (int source = 0; source < 2; source++) {
+    const double *from = source == 0 ? w->gradients : outward;
+    for (unsigned k = 0; k < n; k++) d[k] = !from || (faces && batten_on_face(faces[i], k)) ? 0 : from[n * i + k];
+    if (normalize(n, d) > 0) return;
+  }
+}
+
 /* For the listed points: the nearest interval along the gradient over which f changes its sign. from, to [active],
  * equal where there is none. direction [active][n]. */
-static batten_status find_brackets(batten_sampler *s, work *w, const unsigned char *faces, double reach,
-                                   double *direction, double *from, double *to) {
+static batten_status find_brackets(batten_sampler *s, work *w, const unsigned char *faces, const double *outward,
+                                   double reach, double *direction, double *from, double *to) {
   unsigned n = w->n;
   enum { OFFSETS = 2 * BRACKETS + 1 };
   for (size_t j = 0; j < w->active; j++) {
     size_t i = w->list[j];
     double *d = direction + n * j;
-    for (unsigned k = 0; k < n; k++) d[k] = faces && batten_on_face(faces[i], k) ? 0 : w->gradients[n * i + k];
-    normalize(n, d);
+    search_direction(w, i, faces, outward, d);
     for (int o = 0; o < OFFSETS; o++) along(w, i, d, offset_of(o, reach), w->x + n * (OFFSETS * j + (size_t)o));
   }
   batten_status st = batten_sampler_values(s, OFFSETS * w->active, w->x, w->values);
@@ -117,8 +126,8 @@ static batten_status find_brackets(batten_sampler *s, work *w, const unsigned ch
   return BATTEN_OK;
 }
 
-static batten_status bisect(batten_sampler *s, work *w, double *x, const unsigned char *faces, double reach,
-                            double tolerance, double *distance) {
+static batten_status bisect(batten_sampler *s, work *w, double *x, const unsigned char *faces, const double *outward,
+                            double reach, double tolerance, double *distance) {
   unsigned n = w->n;
   batten_context *ctx = s->ctx;
   double *direction = NULL, *from = NULL, *to = NULL;
@@ -133,7 +142,7 @@ static batten_status bisect(batten_sampler *s, work *w, double *x, const unsigne
       !(from = batten_alloc_array(ctx, w->active, sizeof *from)) ||
       !(to = batten_alloc_array(ctx, w->active, sizeof *to)))
     goto done;
-  st = find_brackets(s, w, faces, reach, direction, from, to);
+  st = find_brackets(s, w, faces, outward, reach, direction, from, to);
   for (int round = 0; st >= 0 && left > 0 && round < BISECTIONS_MAX; round++) {
     left = 0;
     for (size_t j = 0; j < w->active; j++)
@@ -176,7 +185,7 @@ batten_status batten_project_points(batten_sampler *sampler, size_t count, doubl
   for (size_t i = 0; i < count; i++) w.list[i] = i;
   memcpy(w.home, x, count * n * sizeof *x);
   st = newton(sampler, &w, x, faces, reach, tolerance, outward, distance);
-  if (st >= 0 && w.active > 0) st = bisect(sampler, &w, x, faces, reach, tolerance, distance);
+  if (st >= 0 && w.active > 0) st = bisect(sampler, &w, x, faces, outward, reach, tolerance, distance);
 done:
   batten_free(ctx, w.batch);
   batten_free(ctx, w.gradients);

@@ -14,7 +14,8 @@ double batten_newton_step(unsigned n, double f, const double *gradient, unsigned
                           double *outward);
 
 /* Moves the points x [count][n] onto f = 0 until |f| / |grad f| <= tolerance, each at most `reach` from its place or
- * little more; faces [count] or NULL; outward [count][n] or NULL. What Newton's method does not settle (kinks, flat
+ * little more; faces [count] or NULL; outward [count][n] or NULL: unit normals as far as
+ * known (else 0) on entry, against the gradient afterwards. What Newton's method does not settle (kinks, flat
  * places) is bracketed along the last gradient and bisected. distance [count]: what is left, |f| / |grad f| or the
  * width of a bracket over which f changes its sign, whichever decided. */
 batten_status batten_project_points(batten_sampler *sampler, size_t count, double *x, const unsigned char *faces,

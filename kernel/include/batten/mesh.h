@@ -76,6 +76,7 @@ typedef struct batten_polygonize_info {
   double cell;         /* what was used */
   double distance_max; /* max |f| / |grad f| over the vertices, caller's unit */
   int clipped;         /* the surface reaches the box and was cut cleanly there */
+  size_t self_intersections; /* pairs of triangles that cross, see batten_mesh_self_intersections */
   double time_track_s, time_improve_s;
 } batten_polygonize_info;
 
