@@ -263,12 +263,18 @@ static size_t cell_of(const check_grid *g, const double *x) {
   return at[0] + g->nodes[0] * (at[1] + g->nodes[1] * at[2]);
 }
 
+/* Gaps from the nearest point beyond which no f = 0 is due, by dimension. A contour passes half a gap from a point, and
+ * bulges. Of points scattered at random on a surface the widest hole has 1.7 mean spacings to its rim (N = 1000);
+ * measured on spheres and bodies of 60 to 1000 points: with 2.5, 3 cells at most of some 5000 are beyond. */
+static const double REACH[3] = {1, 1, 2.5};
+
 typedef struct cell_query {
   const check_grid *grid;
   const surface_data *data;
   const size_t *list;
   size_t count;
-  double *excess; /* [count][2] distance to the nearest point over 1 and 3 of its gaps, less half a cell's diagonal */
+  double *
+      excess; /* [count][2] distance to the nearest point over 1 and REACH of its gaps, less half a cell's diagonal */
 } cell_query;
 
 enum { CELLS_PER_TASK = 512 };
@@ -284,7 +290,7 @@ static void query_cells(void *arg, size_t block) {
     node_place(q->grid, q->list[i], 0.5, x);
     batten_tree_nearest(q->data->tree, x, 1, SIZE_MAX, &nearest, &distance);
     q->excess[2 * i] = distance - half_diagonal - q->data->gap[nearest];
-    q->excess[2 * i + 1] = distance - half_diagonal - 3 * q->data->gap[nearest];
+    q->excess[2 * i + 1] = distance - half_diagonal - REACH[q->grid->n - 1] * q->data->gap[nearest];
   }
 }
 

@@ -35,6 +35,9 @@ typedef struct fit_state {
   batten_solid_info info;
 } fit_state;
 
+/* max |f| / range of the values above which the fit counts as inaccurate. */
+static const double RESIDUAL = 1e-10;
+
 /* ---- checks -------------------------------------------------------------------------------------- */
 
 static batten_status check_enum(batten_context *ctx, const char *name, int value, int last) {
@@ -216,8 +219,17 @@ static batten_status try_oriented(fit_state *f, batten_orient_data data, attempt
 
 /* ---- the cure ------------------------------------------------------------------------------------ */
 
+static bool is_good(const attempt *a) { return a->check.clean && a->spline.residual_max <= RESIDUAL; }
+
 static size_t complaints(const batten_sign_check *c) {
   return c->weak_gradients + c->flipped_neighbours + c->phantom_components + c->phantom_cells;
+}
+
+static bool is_better(const attempt *a, const attempt *b) {
+  if (!b->solid || is_good(a)) return true;
+  if (a->check.clean != b->check.clean) return a->check.clean;
+  size_t of_a = complaints(&a->check), of_b = complaints(&b->check);
+  return of_a < of_b || (of_a == of_b && a->spline.residual_max < b->spline.residual_max);
 }
 
 /* Errors that end the fit even where another way might be left. */
@@ -271,11 +283,11 @@ static batten_status cure(fit_state *f) {
     kinds[1] = small ? BATTEN_ORIENT_DATA_PAIRS : BATTEN_ORIENT_DATA_GRADIENTS;
   }
   batten_status st = orient(f);
-  for (int k = 0; st >= 0 && k < 2 && !f->best.check.clean; k++) {
+  for (int k = 0; st >= 0 && k < 2 && !is_good(&f->best); k++) {
     if (k == 1 && kinds[1] == kinds[0]) break;
     attempt next = {0};
     st = try_oriented(f, kinds[k], &next);
-    if (st >= 0 && (!f->best.solid || complaints(&next.check) < complaints(&f->best.check))) {
+    if (st >= 0 && is_better(&next, &f->best)) {
       batten_solid_free(f->best.solid);
       f->best = next;
       next.solid = NULL;
@@ -287,9 +299,6 @@ static batten_status cure(fit_state *f) {
   if (st >= 0 && !f->best.solid) st = BATTEN_E_SINGULAR; /* the text is the last failure's */
   return st;
 }
-
-/* max |f| / range of the values above which the fit counts as inaccurate. */
-static const double RESIDUAL = 1e-10;
 
 /* ---- the report ---------------------------------------------------------------------------------- */
 
@@ -331,6 +340,10 @@ static batten_status finish(fit_state *f) {
   info->points_used = f->data.count;
   info->duplicates_merged = f->data.given - f->data.count;
   info->orientation = oriented ? f->orientation : BATTEN_ORIENTATION_NONE;
+  if (info->orientation != BATTEN_ORIENTATION_ESTIMATED) {
+    info->orient_method = BATTEN_ORIENT_METHOD_AUTO;
+    info->orient_lambda = 0;
+  }
   info->orient_data = f->best.data;
   info->check_final = f->best.check;
   info->spline = f->best.spline;

@@ -114,28 +114,44 @@ static double gap_of_lines(const surface_data *d, size_t i, const size_t *neares
   }
 }
 
-/* gap: the spacing, or the largest gap between lines at a point and its neighbours (where lines cross, the points of
- * the crossing know of none). lines [count]. */
-static void spread_gaps(surface_data *d, size_t k, const size_t *index, const double *lines) {
-  for (size_t i = 0; i < d->count; i++) {
-    d->gap[i] = fmax(d->spacing[i], lines[i]);
-    for (size_t j = 0; j < k; j++) d->gap[i] = fmax(d->gap[i], lines[index[i * k + j]]);
+/* In the plane: the distance to the nearest point that lies another way than the nearest one (60 degrees off), so
+ * that both sides of a wide gap on the contour know of it. */
+static double gap_of_contour(const surface_data *d, size_t i, size_t *near, double *distance) {
+  const double *x = d->points + 2 * i;
+  for (size_t k = 4;; k *= 4) {
+    size_t found = batten_tree_nearest(d->tree, x, k, i, near, distance);
+    const double *first = d->points + 2 * near[0];
+    for (size_t j = 1; j < found; j++) {
+      const double *other = d->points + 2 * near[j];
+      double t = (first[0] - x[0]) * (other[0] - x[0]) + (first[1] - x[1]) * (other[1] - x[1]);
+      if (t < 0.5 * distance[0] * distance[j]) return distance[j];
+    }
+    if (found < k || k == NEIGHBOURS_MAX) return distance[found - 1];
   }
 }
 
+/* gap: how far the surface may be expected to go on without data. In space the spacing, or the largest gap between
+ * lines at a point and its neighbours (where lines cross, the points of the crossing know of none). */
 static batten_status measure_gaps(batten_context *ctx, surface_data *d, size_t k, const size_t *index) {
   size_t *near = batten_alloc_array(ctx, NEIGHBOURS_MAX, sizeof *near);
   double *distance = batten_alloc_array(ctx, NEIGHBOURS_MAX, sizeof *distance);
-  double *lines = batten_alloc_array(ctx, d->count, sizeof *lines);
-  batten_status st = near && distance && lines ? BATTEN_OK : BATTEN_E_NOMEM;
+  double *own = batten_alloc_array(ctx, d->count, sizeof *own);
+  batten_status st = near && distance && own ? BATTEN_OK : BATTEN_E_NOMEM;
   if (st < 0) goto done;
-  for (size_t i = 0; i < d->count; i++)
-    lines[i] = d->n == 3 && k == NEIGHBOURS ? gap_of_lines(d, i, index + i * k, near, distance) : 0;
-  spread_gaps(d, k, index, lines);
+  for (size_t i = 0; i < d->count; i++) {
+    bool lines = d->n == 3 && k == NEIGHBOURS;
+    own[i] = d->n == 2 ? gap_of_contour(d, i, near, distance)
+             : lines   ? gap_of_lines(d, i, index + i * k, near, distance)
+                       : 0;
+  }
+  for (size_t i = 0; i < d->count; i++) {
+    d->gap[i] = fmax(d->spacing[i], own[i]);
+    for (size_t j = 0; d->n == 3 && j < k; j++) d->gap[i] = fmax(d->gap[i], own[index[i * k + j]]);
+  }
 done:
   batten_free(ctx, near);
   batten_free(ctx, distance);
-  batten_free(ctx, lines);
+  batten_free(ctx, own);
   return st;
 }
 

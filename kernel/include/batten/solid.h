@@ -24,8 +24,10 @@ typedef enum batten_orientation {
 } batten_orientation;
 
 typedef enum batten_orient_data {
-  BATTEN_ORIENT_DATA_AUTO = 0,  /* gradients up to 2000 points, pairs above */
-  BATTEN_ORIENT_DATA_GRADIENTS, /* Hermite-Birkhoff refit with the kernel of order m+1 (r^3, r^4 ln r), no carrier */
+  BATTEN_ORIENT_DATA_AUTO = 0,  /* gradients up to 2000 points, pairs above; the other where the check is not clean or
+                                   the system too ill-conditioned */
+  BATTEN_ORIENT_DATA_GRADIENTS, /* Hermite-Birkhoff refit, no carrier, with the lowest order from m on whose kernel has
+                                   two derivatives to spare (from m = 2: r^3, r^4 ln r) */
   BATTEN_ORIENT_DATA_PAIRS      /* refit with points off the surface, same kernel and carrier */
 } batten_orient_data;
 
@@ -50,27 +52,32 @@ typedef enum batten_sign_state {
 typedef struct batten_solid_options {
   size_t struct_size;
   const batten_carrier *carrier; /* NULL = auto: batten_carrier_fit */
-  const double *normals;         /* [N][n] outward, any positive length; NULL = none */
-  double merge_radius;           /* points closer than this become one; caller's unit, >= 0. Default 0: only points
-                                    equal to within 1e-12 of the box merge */
+  const double *normals;         /* [N][n] outward, any positive length; NULL = none. They decide: turned inwards they
+                                    make the outside the solid, which the check reports as ambiguous, because f is
+                                    held negative far away */
+  double merge_radius;           /* points closer than this become one, the first given stays; caller's unit, >= 0.
+                                    Default 0: only points equal to within 1e-12 of the box merge */
   batten_orientation orientation;
   batten_orient_data orient_data;
   batten_orient_method orient_method;
   size_t energy_points;          /* least-energy orientation works on at most so many points. Default 1000. */
   double pair_distance;          /* off-surface distance over the local spacing, in (0, 1]. Default 0.5. */
-  size_t check_cells;            /* cells of the sign check's grid along the longest side. Default 40. */
+  size_t check_cells;            /* cells of the sign check's grid along the longest side, 8 .. 1000. Default 40. */
   batten_spline_options spline;
 } batten_solid_options;
 BATTEN_API batten_solid_options batten_solid_options_default(void);
 
 /* What the check of the sign field found. */
 typedef struct batten_sign_check {
-  size_t weak_gradients;     /* data points where |grad f| is under 1 % of the median */
+  size_t weak_gradients;     /* data points where |grad f| is under 1 % of the median, or where f does not change sign
+                                from a tenth of the spacing before to as much behind along it */
   size_t flipped_neighbours; /* pairs of neighbouring points with locally like tangents whose gradients oppose */
   size_t phantom_components; /* pieces of f = 0 without data near them */
-  size_t phantom_cells;      /* grid cells crossed by f = 0 farther than 3 local spacings from all data */
+  size_t phantom_cells;      /* grid cells crossed by f = 0 too far from all data: one gap of the contour in the plane,
+                                2.5 local spacings (or gaps between sampled lines) in space; and positive samples of f
+                                among 256 on spheres of 1.5 to 50 half diagonals of the box */
   int inside_out;            /* non-zero: f was positive far away and has been turned */
-  int clean;                 /* all of the above are fine */
+  int clean;                 /* none of these; phantom cells up to 0.2 % of the crossed ones do not count */
 } batten_sign_check;
 
 typedef struct batten_solid_info {
@@ -82,30 +89,36 @@ typedef struct batten_solid_info {
   double orient_lambda;               /* smoothing at which the estimated orientation was settled */
   batten_sign_check check;            /* of the first fit */
   batten_sign_check check_final;      /* of the solid that is returned */
-  double residual_max;  /* max |f(x_i)| / (max - min of the interpolated values) */
+  double residual_max;  /* max |f(x_i)| / (max - min of the interpolated values; where a carrier runs through all points
+                           its own size in the box) */
   double distance_max;  /* max |f(x_i)| / |grad f(x_i)|, caller's unit */
   double spacing;       /* median distance to the nearest other point, caller's unit */
   batten_spline_info spline; /* of the fit that is returned */
   double time_fit_s, time_check_s, time_orient_s;
 } batten_solid_info;
 
-/* Fit to points [count][n], n = 2 or 3 (1: two points or more bound an interval).
- * Positive status: BATTEN_W_AMBIGUOUS, BATTEN_W_ACCURACY. Fails as batten_spline_fit, and INVALID for a carrier
- * that the spline reproduces (the text says which to take). *out untouched on failure; info may be NULL. */
+/* Fit to points [count][n], n = 2 or 3. In one dimension an even number of points bounds intervals, and their order
+ * orients them. Positive status: BATTEN_W_AMBIGUOUS, BATTEN_W_ACCURACY (residual_max above 1e-10). Fails as
+ * batten_spline_fit, and INVALID for a carrier that the spline reproduces (the text says which to take): every carrier
+ * alone with m >= 3 needs orientation, and without a carrier of the caller's it is estimated at once. *out untouched on
+ * failure; info may be NULL. The check costs (about 1.5 check_cells)^n evaluations of f. */
 BATTEN_API batten_status batten_solid_fit(batten_context *ctx, unsigned n, size_t count, const double *points,
                                           const batten_solid_options *opt, batten_solid **out,
                                           batten_solid_info *info);
 
-/* The same spline under another carrier: the paper's deformation (figure 5). */
+/* The same spline under another carrier: the paper's deformation (figure 5). The points of the new solid are the old
+ * ones moved to its surface by Newton's method, its box is theirs. */
 BATTEN_API batten_status batten_solid_with_carrier(batten_context *ctx, const batten_solid *solid,
                                                    batten_carrier *carrier, batten_solid **out);
 
-/* From parts; sign is +1 or -1. spline and carrier are retained. lower/upper [n]: box of the data. */
+/* From parts; sign is +1 or -1. spline and carrier are retained. lower/upper [n]: box of the data. The points of the
+ * solid are the centres at which f vanishes to 1e-6; all centres when, after smoothing, under a quarter do. */
 BATTEN_API batten_status batten_solid_create(batten_context *ctx, batten_spline *spline, batten_carrier *carrier,
                                              int sign, const double *lower, const double *upper,
                                              batten_solid **out);
 
-/* f = sign (f_c - U), its gradient and Hessian; arrays as batten_spline_evaluate. */
+/* f = sign (f_c - U), its gradient and Hessian; arrays as batten_spline_evaluate. Takes as much memory again as it
+ * returns. */
 BATTEN_API batten_status batten_solid_evaluate(batten_context *ctx, const batten_solid *s, size_t count,
                                                const double *points, double *values, double *gradients,
                                                double *hessians);
