@@ -1,0 +1,239 @@
+/* batten inspect: what is in a file, and its measures. */
+#include "cli.h"
+
+#include <limits.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { OPT_REPORT = CHAR_MAX + 1, OPT_THREADS };
+
+static const cli_option table[] = {
+    {"report", OPT_REPORT, "FILE", "figures as a flat JSON object (keys: docs/report.md)"},
+    {"threads", OPT_THREADS, "N", "threads; default all cores"},
+    {"quiet", 'q', NULL, "no summary"},
+    {"help", 'h', NULL, "this text"},
+    {0},
+};
+
+typedef struct request {
+  const char *input;
+  cli_outputs outputs;
+  size_t threads;
+  bool quiet, help;
+} request;
+
+static void print_help(void) {
+  printf(
+      "usage: batten inspect FILE [OPTIONS]\n\n"
+      "Tells what is in a file: points, a mesh (its measures, whether it is closed and manifold, triangles that "
+      "cross),\n"
+      "a solid or a carrier saved by batten.\n\n");
+  cli_options_print(table);
+  printf("\nexample:\n\n  batten inspect mesh.ply --report mesh.json\n");
+}
+
+static int parse(int argc, char **argv, request *q) {
+  cli_options o;
+  if (!cli_options_open(&o, "inspect", table, argc, argv)) return CLI_FAILED;
+  int status = CLI_DONE, key;
+  while (status == CLI_DONE && !q->help && (key = cli_options_next(&o)) != CLI_OPTIONS_END) {
+    bool ok = true;
+    switch (key) {
+      case CLI_OPTIONS_BAD:
+        ok = false;
+        break;
+      case 'h':
+        q->help = true;
+        break;
+      case 'q':
+        q->quiet = true;
+        break;
+      case OPT_REPORT:
+        ok = cli_outputs_add(&q->outputs, CLI_OUTPUT_REPORT, o.value);
+        break;
+      default:
+        ok = cli_parse_count("--threads", o.value, 1, 64, &q->threads);
+    }
+    if (!ok) status = CLI_USAGE;
+  }
+  if (status == CLI_DONE && !q->help) {
+    if (optind >= argc)
+      status = cli_usage("inspect", "no file");
+    else if (optind + 1 < argc)
+      status = cli_usage("inspect", "one file at a time, not also '%s'", argv[optind + 1]);
+    else
+      q->input = argv[optind];
+  }
+  cli_options_close(&o);
+  return status;
+}
+
+/* ---- kinds --------------------------------------------------------------------------------------- */
+
+static void tell_box(cli_report *r, bool print, unsigned n, const double *lower, const double *upper) {
+  static const char *const names[] = {"box_x_min", "box_x_max", "box_y_min", "box_y_max", "box_z_min", "box_z_max"};
+  if (print) printf("%-14s ", "box");
+  for (unsigned k = 0; k < n; k++) {
+    cli_report_number(r, names[2 * k], lower[k]);
+    cli_report_number(r, names[2 * k + 1], upper[k]);
+    if (print) printf("%s%.6g .. %.6g", k ? "  x  " : "", lower[k], upper[k]);
+  }
+  if (print) putchar('\n');
+}
+
+static batten_status tell_points(cli_run *run, const char *path, bool print, cli_report *r) {
+  batten_cloud cloud = {0};
+  batten_status st = batten_read_points(run->ctx, path, NULL, &cloud);
+  if (st < 0) return st;
+  double lower[3] = {INFINITY, INFINITY, INFINITY}, upper[3] = {-INFINITY, -INFINITY, -INFINITY};
+  for (size_t i = 0; i < cloud.count * cloud.n; i++) {
+    lower[i % cloud.n] = fmin(lower[i % cloud.n], cloud.points[i]);
+    upper[i % cloud.n] = fmax(upper[i % cloud.n], cloud.points[i]);
+  }
+  cli_run_clear(run);
+  cli_report_count(r, "dimension", cloud.n);
+  cli_report_count(r, "points", cloud.count);
+  cli_report_bool(r, "normals", cloud.normals != NULL);
+  if (print)
+    cli_line("points", "%zu, %s%s", cloud.count, cloud.n == 2 ? "plane" : "in space",
+             cloud.normals ? ", with normals" : "");
+  tell_box(r, print && cloud.count, cloud.n, lower, upper);
+  batten_cloud_free(run->ctx, &cloud);
+  return st;
+}
+
+static batten_status tell_mesh(cli_run *run, const char *path, bool print, cli_report *r) {
+  batten_mesh *mesh = NULL;
+  batten_mesh_measures m;
+  size_t crossing;
+  batten_status st = batten_read_mesh(run->ctx, path, &mesh);
+  if (st < 0) return st;
+  st = batten_mesh_measure(run->ctx, mesh, &m);
+  if (st >= 0) st = batten_mesh_self_intersections(run->ctx, mesh, &crossing);
+  if (st >= 0) {
+    cli_run_clear(run);
+    cli_report_count(r, "dimension", 3);
+    cli_report_mesh(r, &m, &crossing);
+    if (print) {
+      cli_print_mesh(&m);
+      cli_line("triangles", "angles %.1f .. %.1f degrees, %.1f %% with all of them above 20; %zu pairs cross",
+               m.angle_min_deg, m.angle_max_deg, 100 * m.angles_above_20deg, crossing);
+      cli_line("edges", "%.4g .. %.4g, mean %.4g", m.edge_min, m.edge_max, m.edge_mean);
+      cli_line("centroid", "%.6g  %.6g  %.6g", m.centroid[0], m.centroid[1], m.centroid[2]);
+    }
+    tell_box(r, false, 3, m.lower, m.upper);
+  }
+  batten_mesh_free(mesh);
+  return st;
+}
+
+static void tell_carrier_kind(cli_report *r, bool print, const batten_carrier *carrier) {
+  batten_carrier_parts parts;
+  batten_carrier_get_parts(carrier, &parts);
+  cli_report_text(r, "carrier", batten_carrier_kind_name(parts.kind));
+  if (!print) return;
+  printf("%-14s %s", "carrier", batten_carrier_kind_name(parts.kind));
+  for (size_t i = 0; i < parts.parameter_count && i < 16; i++) printf(" %.6g", parts.parameters[i]);
+  putchar('\n');
+}
+
+static batten_status tell_solid(cli_run *run, const char *path, bool print, cli_report *r) {
+  batten_solid *solid = NULL;
+  batten_status st = batten_load_solid(run->ctx, path, &solid);
+  if (st < 0) return st;
+  batten_spline_parts parts = {.struct_size = sizeof parts};
+  batten_spline_get_parts(batten_solid_spline(solid), &parts);
+  double lower[3], upper[3];
+  batten_solid_box(solid, lower, upper);
+  int power = 2 * (int)parts.m - (int)parts.n;
+  cli_run_clear(run);
+  cli_report_count(r, "dimension", parts.n);
+  cli_report_count(r, "order", parts.m);
+  cli_report_count(r, "centers", parts.count);
+  cli_report_count(r, "gradients", parts.gradient_count);
+  cli_report_integer(r, "sign", batten_solid_sign(solid));
+  if (print) {
+    cli_line("solid", "of dimension %u from %zu centres%s", parts.n, parts.count,
+             parts.gradient_count ? " with gradients" : "");
+    cli_line("kernel", "r^%d%s, polynomial of degree %u", power, parts.n % 2 ? "" : " ln r", parts.m - 1);
+    cli_line("sign", "%+d", batten_solid_sign(solid));
+  }
+  tell_carrier_kind(r, print, batten_solid_carrier(solid));
+  tell_box(r, print, parts.n, lower, upper);
+  batten_solid_free(solid);
+  return st;
+}
+
+static batten_status tell_carrier(cli_run *run, const char *path, bool print, cli_report *r) {
+  batten_carrier *carrier = NULL;
+  batten_status st = batten_load_carrier(run->ctx, path, &carrier);
+  if (st < 0) return st;
+  batten_carrier_parts parts;
+  batten_carrier_get_parts(carrier, &parts);
+  cli_report_count(r, "dimension", parts.n);
+  tell_carrier_kind(r, print, carrier);
+  batten_carrier_free(carrier);
+  return st;
+}
+
+static int work(request *q) {
+  static const char *const kinds[] = {"unknown", "points", "mesh", "solid", "carrier", "document"};
+  cli_run run;
+  if (!cli_run_open(&run, (unsigned)q->threads, 0, q->quiet)) return CLI_FAILED;
+  cli_report report;
+  cli_report_open(&report);
+  batten_file_kind kind = BATTEN_FILE_UNKNOWN;
+  batten_status st = batten_file_identify(run.ctx, q->input, &kind);
+  bool print = !q->quiet;
+  if (st >= 0) {
+    cli_report_text(&report, "command", "inspect");
+    cli_report_common(&report, &run, st);
+    cli_report_text(&report, "input", q->input);
+    cli_report_text(&report, "kind", kinds[kind]);
+    if (print) cli_line("file", "%s: %s", q->input, kinds[kind]);
+    switch (kind) {
+      case BATTEN_FILE_POINTS:
+        st = tell_points(&run, q->input, print, &report);
+        break;
+      case BATTEN_FILE_MESH:
+        st = tell_mesh(&run, q->input, print, &report);
+        break;
+      case BATTEN_FILE_SOLID:
+        st = tell_solid(&run, q->input, print, &report);
+        break;
+      case BATTEN_FILE_CARRIER:
+        st = tell_carrier(&run, q->input, print, &report);
+        break;
+      case BATTEN_FILE_DOCUMENT:
+        break;
+      case BATTEN_FILE_UNKNOWN:
+        st = batten_fail(run.ctx, BATTEN_E_FORMAT, "%s: neither points, a mesh nor a document of batten", q->input);
+    }
+  }
+  cli_report_number(&report, "time_total_s", batten_now() - run.started);
+  cli_report_count(&report, "peak_bytes", batten_bytes_peak(run.ctx));
+  int status = st < 0 ? cli_run_failed(&run, st) : CLI_DONE;
+  for (size_t i = 0; status == CLI_DONE && i < q->outputs.count; i++) {
+    const cli_output *f = &q->outputs.items[i];
+    if (!cli_report_write(&report, f->staged ? f->staged : f->target, f->path)) status = CLI_FAILED;
+  }
+  if (status == CLI_DONE && !cli_outputs_commit(&q->outputs)) status = CLI_FAILED;
+  cli_report_close(&report);
+  cli_run_close(&run);
+  return status;
+}
+
+int cli_inspect(int argc, char **argv) {
+  request q = {0};
+  int status = parse(argc, argv, &q);
+  if (status == CLI_DONE && q.help)
+    print_help();
+  else if (status == CLI_DONE) {
+    bool usage;
+    status = cli_outputs_check(&q.outputs, q.input, &usage) ? work(&q) : usage ? CLI_USAGE : CLI_FAILED;
+  }
+  cli_outputs_close(&q.outputs);
+  return status;
+}

@@ -1,0 +1,91 @@
+/* The context of a run, its progress bar, and Ctrl-C.
+ *
+ * The bar is drawn on stderr when that is a terminal and the work lasts; it is gone before anything else is said.
+ * Ctrl-C asks the library to cancel, so that files in the making are removed; a second one ends at once. */
+#include "cli.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+static volatile sig_atomic_t interrupted;
+
+static void note_interrupt(int signal_number) {
+  (void)signal_number;
+  interrupted = 1;
+}
+
+bool cli_interrupted(void) { return interrupted != 0; }
+
+static const double patience_s = 0.5, redraw_s = 0.1;
+
+static int show(void *user, const char *phase, double fraction) {
+  cli_run *run = user;
+  if (interrupted) return 1;
+  double now = batten_now();
+  if (!run->bar || now - run->started < patience_s || now - run->drawn < redraw_s) return 0;
+  enum { CELLS = 32 };
+  char cells[CELLS + 1];
+  int full = (int)(fraction * CELLS + 0.5);
+  for (int i = 0; i < CELLS; i++) cells[i] = i < full ? '#' : '.';
+  cells[CELLS] = '\0';
+  fprintf(stderr, "\r\033[K%-12.24s [%s] %3.0f %%  %.0f s", phase, cells, 100 * fraction, now - run->started);
+  fflush(stderr);
+  run->drawn = now;
+  run->line = true;
+  return 0;
+}
+
+void cli_run_clear(cli_run *run) {
+  if (run->line) {
+    fputs("\r\033[K", stderr);
+    fflush(stderr);
+  }
+  run->line = false;
+}
+
+bool cli_run_open(cli_run *run, unsigned threads, size_t memory_limit, bool quiet) {
+  *run = (cli_run){.quiet = quiet, .bar = !quiet && isatty(STDERR_FILENO), .started = batten_now()};
+  long cores = sysconf(_SC_NPROCESSORS_ONLN);
+  run->threads = threads ? threads : cores > 64 ? 64 : cores > 0 ? (unsigned)cores : 1;
+  batten_context_options o = batten_context_options_default();
+  o.threads = run->threads;
+  o.memory_limit = memory_limit;
+  o.progress = show;
+  o.progress_user = run;
+  batten_status st = batten_context_new(&o, &run->ctx);
+  if (st < 0) {
+    cli_error("%s", batten_status_text(st));
+    return false;
+  }
+  struct sigaction action = {.sa_handler = note_interrupt, .sa_flags = (int)(SA_RESETHAND | SA_RESTART)};
+  sigemptyset(&action.sa_mask);
+  sigaction(SIGINT, &action, NULL);
+  sigaction(SIGTERM, &action, NULL);
+  return true;
+}
+
+void cli_run_close(cli_run *run) {
+  cli_run_clear(run);
+  batten_context_free(run->ctx);
+  run->ctx = NULL;
+}
+
+int cli_run_failed(cli_run *run, batten_status status) {
+  cli_run_clear(run);
+  if (status == BATTEN_E_CANCELLED && interrupted) {
+    cli_error("interrupted; nothing was written");
+    return CLI_INTERRUPTED;
+  }
+  const char *text = batten_error(run->ctx);
+  cli_error("%s", *text ? text : batten_status_text(status));
+  return CLI_FAILED;
+}
+
+void cli_run_warn(cli_run *run, batten_status status) {
+  if (status <= 0) return;
+  cli_run_clear(run);
+  const char *text = batten_error(run->ctx);
+  cli_error("warning: %s", *text ? text : batten_status_text(status));
+}

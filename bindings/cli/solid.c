@@ -1,0 +1,451 @@
+/* batten solid: points to a solid, its surface, a picture, figures.
+ *
+ * Phases: read, fit, surface, measures and fields, write. All outputs are checked before the first and appear
+ * after the last, or not at all. */
+#include "cli.h"
+
+#include <limits.h>
+#include <math.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "solid.h"
+
+/* ---- command line -------------------------------------------------------------------------------- */
+
+enum {
+  OPT_PICTURE = CHAR_MAX + 1,
+  OPT_REPORT,
+  OPT_SAVE,
+  OPT_CARRIER,
+  OPT_ORDER,
+  OPT_SMOOTHING,
+  OPT_MERGE,
+  OPT_ORIENTATION,
+  OPT_ORIENT_DATA,
+  OPT_ORIENT_METHOD,
+  OPT_METHOD,
+  OPT_CELL,
+  OPT_BOX,
+  OPT_MEMORY,
+  OPT_LOO,
+  OPT_THREADS,
+  OPT_VIEW,
+  OPT_UP,
+  OPT_COLOR,
+  OPT_DOTS,
+  OPT_SIZE,
+  OPT_TITLE
+};
+
+static const cli_option table[] = {
+    {"output", 'o', "FILE",
+     "surface, by extension: .ply .obj .stl .off .vtp .vtu; outline of plane points:\n"
+     ".svg .csv .xyz .txt .vtp .obj; may be given more than once"},
+    {"picture", OPT_PICTURE, "FILE", "shaded view .png, of plane points .png or .svg"},
+    {"report", OPT_REPORT, "FILE", "figures as a flat JSON object (keys: docs/report.md)"},
+    {"save", OPT_SAVE, "FILE", "the solid itself, as JSON that batten reads back to the same bits"},
+    {"carrier", OPT_CARRIER, "WHAT",
+     "auto, ball, ellipsoid (fitted to the points), none, or a carrier FILE.json;\n"
+     "default auto"},
+    {"order", OPT_ORDER, "M", "order of the spline's energy, 2 to 4; default 2"},
+    {"smoothing", OPT_SMOOTHING, "RHO", "0 passes through the points, larger is smoother; default 0"},
+    {"merge-radius", OPT_MERGE, "R", "points closer than this become one; default 0: equal points only"},
+    {"orientation", OPT_ORIENTATION, "HOW",
+     "auto (where the check of the sign asks for it), never, given (normals\n"
+     "of the file), estimate; default auto"},
+    {"orient-data", OPT_ORIENT_DATA, "WHAT", "orientation enters as auto, gradients or pairs; default auto"},
+    {"orient-method", OPT_ORIENT_METHOD, "HOW", "estimated by auto, energy or planes; default auto"},
+    {"method", OPT_METHOD, "NAME", "linear solver: auto, cholesky, mixed, ldl or qr; default auto"},
+    {"cell", OPT_CELL, "LENGTH", "edge length of the mesh; default from the points' spacing"},
+    {"box", OPT_BOX, "X0,Y0[,Z0],X1,...", "cut the surface at this box; default: the points' box grown by 25 %"},
+    {"memory", OPT_MEMORY, "SIZE", "use at most so much, for instance 2G; default no limit"},
+    {"loo", OPT_LOO, "N", "leave-one-out errors of N points, all or none; default 256"},
+    {"threads", OPT_THREADS, "N", "threads; default all cores (BLAS has its own: OPENBLAS_NUM_THREADS)"},
+    {"view", OPT_VIEW, "AZ,EL", "direction of the picture's camera, degrees; default 35,22"},
+    {"up", OPT_UP, "AXIS", "x, y or z points upwards in the picture; default z"},
+    {"color", OPT_COLOR, "WHAT", "colour the picture by none, gradient, mean or gauss (curvature); default none"},
+    {"dots", OPT_DOTS, NULL, "draw the points in the picture"},
+    {"size", OPT_SIZE, "W,H", "picture's size in pixels; default 1200,900"},
+    {"title", OPT_TITLE, "TEXT", "title in the picture"},
+    {"quiet", 'q', NULL, "no summary, no progress"},
+    {"help", 'h', NULL, "this text"},
+    {0},
+};
+
+static void print_help(void) {
+  printf(
+      "usage: batten solid POINTS [OPTIONS]\n\n"
+      "Makes the smooth solid whose surface passes through scattered points. POINTS: .xyz .txt .csv .ply .obj .off\n"
+      ".stl, also with .gz; two columns are a plane solid; normals are used where they are needed.\n\n");
+  cli_options_print(table);
+  printf(
+      "\nexample: a ball from 200 points, with mesh, picture and figures\n\n"
+      "  awk 'BEGIN { for (i = 0; i < 200; i++) { z = 1 - (2 * i + 1) / 200; r = sqrt(1 - z * z); a = 2.39996 * i;\n"
+      "    print r * cos(a), r * sin(a), z } }' > ball.xyz\n"
+      "  batten solid ball.xyz -o ball.ply --picture ball.png --report ball.json\n\n"
+      "exit status: 0 done (a warning on stderr and `status` in the report say when to look twice), 1 could not,\n"
+      "2 wrong usage, 130 interrupted\n");
+}
+
+/* One option into the request; false after a line on stderr. */
+static bool take_fit_option(solid_request *q, int key, const char *v) {
+  static const char *const orientations[] = {"auto", "never", "given", "estimate", NULL};
+  static const char *const orient_data[] = {"auto", "gradients", "pairs", NULL};
+  static const char *const orient_methods[] = {"auto", "energy", "planes", NULL};
+  static const char *const methods[] = {"auto", "cholesky", "mixed", "ldl", "qr", NULL};
+  int word = 0;
+  size_t count = 0;
+  bool ok = true;
+  switch (key) {
+    case OPT_CARRIER:
+      q->carrier = v;
+      break;
+    case OPT_ORDER:
+      ok = cli_parse_count("--order", v, 1, 4, &count);
+      q->fit.spline.m = (unsigned)count;
+      break;
+    case OPT_SMOOTHING:
+      ok = cli_parse_number("--smoothing", v, 0, INFINITY, &q->fit.spline.smoothing);
+      break;
+    case OPT_MERGE:
+      ok = cli_parse_number("--merge-radius", v, 0, INFINITY, &q->fit.merge_radius);
+      break;
+    case OPT_ORIENTATION:
+      ok = cli_parse_word("--orientation", v, orientations, &word);
+      q->fit.orientation = (batten_orientation)word;
+      break;
+    case OPT_ORIENT_DATA:
+      ok = cli_parse_word("--orient-data", v, orient_data, &word);
+      q->fit.orient_data = (batten_orient_data)word;
+      break;
+    case OPT_ORIENT_METHOD:
+      ok = cli_parse_word("--orient-method", v, orient_methods, &word);
+      q->fit.orient_method = (batten_orient_method)word;
+      break;
+    case OPT_METHOD:
+      ok = cli_parse_word("--method", v, methods, &word);
+      q->fit.spline.saddle.method = (batten_saddle_method)word;
+      break;
+    case OPT_LOO:
+      if (strcmp(v, "all") == 0)
+        q->fit.spline.loo_samples = SIZE_MAX;
+      else if (strcmp(v, "none") == 0)
+        q->fit.spline.loo_samples = 0;
+      else
+        ok = cli_parse_count("--loo", v, 0, SIZE_MAX - 1, &q->fit.spline.loo_samples);
+      break;
+    case OPT_MEMORY:
+      ok = cli_parse_bytes("--memory", v, &q->memory);
+      break;
+    default:
+      ok = cli_parse_count("--threads", v, 1, 64, &count);
+      q->threads = (unsigned)count;
+  }
+  return ok;
+}
+
+static bool take_view_option(solid_request *q, int key, const char *v) {
+  static const char *const axes[] = {"x", "y", "z", NULL};
+  static const char *const colors[] = {"none", "gradient", "mean", "gauss", NULL};
+  double pair[2] = {0};
+  int word = 0;
+  switch (key) {
+    case OPT_CELL:
+      return cli_parse_number("--cell", v, 1e-300, INFINITY, &q->surface.cell);
+    case OPT_BOX:
+      q->box = v;
+      return true;
+    case OPT_VIEW:
+      if (!cli_parse_numbers("--view", v, 2, pair)) return false;
+      if (fabs(pair[1]) > 90) {
+        cli_error("--view: elevation %g is not from -90 to 90", pair[1]);
+        return false;
+      }
+      q->picture.azimuth_deg = pair[0];
+      q->picture.elevation_deg = pair[1];
+      return true;
+    case OPT_UP:
+      if (!cli_parse_word("--up", v, axes, &word)) return false;
+      q->picture.up_axis = (unsigned)word;
+      return true;
+    case OPT_COLOR:
+      if (!cli_parse_word("--color", v, colors, &word)) return false;
+      q->color = (solid_color)word;
+      return true;
+    case OPT_SIZE:
+      if (!cli_parse_numbers("--size", v, 2, pair)) return false;
+      if (!(pair[0] >= 16 && pair[0] <= 8192 && pair[1] >= 16 && pair[1] <= 8192)) {
+        cli_error("--size: '%s' is not two numbers of pixels from 16 to 8192", v);
+        return false;
+      }
+      q->picture.width = (unsigned)pair[0];
+      q->picture.height = (unsigned)pair[1];
+      return true;
+    case OPT_DOTS:
+      q->dots = true;
+      return true;
+    default:
+      q->picture.title = v;
+      return true;
+  }
+}
+
+/* CLI_DONE: go on; q->help when only that was asked for. */
+static int parse(int argc, char **argv, solid_request *q) {
+  cli_options o;
+  if (!cli_options_open(&o, "solid", table, argc, argv)) return CLI_FAILED;
+  int status = CLI_DONE, key;
+  while (status == CLI_DONE && !q->help && (key = cli_options_next(&o)) != CLI_OPTIONS_END) {
+    bool ok = true;
+    switch (key) {
+      case CLI_OPTIONS_BAD:
+        ok = false;
+        break;
+      case 'h':
+        q->help = true;
+        break;
+      case 'q':
+        q->quiet = true;
+        break;
+      case 'o':
+        ok = cli_outputs_add(&q->outputs, CLI_OUTPUT_SURFACE, o.value);
+        break;
+      case OPT_PICTURE:
+        ok = cli_outputs_add(&q->outputs, CLI_OUTPUT_PICTURE, o.value);
+        break;
+      case OPT_REPORT:
+        ok = cli_outputs_add(&q->outputs, CLI_OUTPUT_REPORT, o.value);
+        break;
+      case OPT_SAVE:
+        ok = cli_outputs_add(&q->outputs, CLI_OUTPUT_SOLID, o.value);
+        break;
+      default:
+        ok = (key >= OPT_CARRIER && key <= OPT_METHOD) || (key >= OPT_MEMORY && key <= OPT_THREADS)
+                 ? take_fit_option(q, key, o.value)
+                 : take_view_option(q, key, o.value);
+    }
+    if (!ok) status = CLI_USAGE;
+  }
+  if (status == CLI_DONE && !q->help) {
+    if (optind >= argc)
+      status = cli_usage("solid", "no file of points");
+    else if (optind + 1 < argc)
+      status = cli_usage("solid", "one file of points at a time, not also '%s'", argv[optind + 1]);
+    else
+      q->input = argv[optind];
+  }
+  cli_options_close(&o);
+  return status;
+}
+
+/* ---- phases -------------------------------------------------------------------------------------- */
+
+static batten_status read_points(solid_work *w) {
+  double start = batten_now();
+  batten_read_points_options o = batten_read_points_options_default();
+  batten_status st = batten_read_points(w->run.ctx, w->request->input, &o, &w->cloud);
+  w->time_read_s = batten_now() - start;
+  return st;
+}
+
+static int count_numbers(const char *text) {
+  int n = 1;
+  for (; *text; text++) n += *text == ',';
+  return n;
+}
+
+/* What could not be checked before the dimension was known. */
+static int check_dimension(solid_work *w) {
+  solid_request *q = w->request;
+  unsigned n = w->cloud.n;
+  if (!cli_outputs_check_dimension(&q->outputs, n)) return CLI_USAGE;
+  if (q->box) {
+    double box[6];
+    if (count_numbers(q->box) != (int)(2 * n)) {
+      cli_error("--box: '%s' is not the %u numbers of two corners", q->box, 2 * n);
+      return CLI_USAGE;
+    }
+    if (!cli_parse_numbers("--box", q->box, 2 * n, box)) return CLI_USAGE;
+    for (unsigned k = 0; k < n; k++) {
+      q->surface.lower[k] = box[k];
+      q->surface.upper[k] = box[n + k];
+      if (box[k] < box[n + k]) continue;
+      cli_error("--box: '%s': the first corner must be below the second", q->box);
+      return CLI_USAGE;
+    }
+  }
+  if (q->fit.orientation == BATTEN_ORIENT_GIVEN && !w->cloud.normals) {
+    cli_error("%s: has no normals, which --orientation given needs; use --orientation estimate", q->input);
+    return CLI_FAILED;
+  }
+  if (2 * q->fit.spline.m <= n) {
+    cli_error("--order: %u is too low for points of dimension %u; use 2 or more", q->fit.spline.m, n);
+    return CLI_USAGE;
+  }
+  return CLI_DONE;
+}
+
+/* A ball about the points' centroid: any ball gives the same solid. */
+static batten_status ball_about(solid_work *w) {
+  unsigned n = w->cloud.n;
+  double center[3] = {0}, radius = 0;
+  for (size_t i = 0; i < w->cloud.count * n; i++) center[i % n] += w->cloud.points[i] / (double)w->cloud.count;
+  for (size_t i = 0; i < w->cloud.count; i++) {
+    double r2 = 0;
+    for (unsigned k = 0; k < n; k++) r2 += pow(w->cloud.points[i * n + k] - center[k], 2);
+    radius += sqrt(r2) / (double)w->cloud.count;
+  }
+  return batten_carrier_ball(w->run.ctx, n, center, radius, &w->carrier);
+}
+
+static batten_status make_carrier(solid_work *w) {
+  const char *name = w->request->carrier;
+  unsigned n = w->cloud.n;
+  if (strcmp(name, "auto") == 0) return BATTEN_OK;
+  if (strcmp(name, "none") == 0) return batten_carrier_none(w->run.ctx, n, &w->carrier);
+  if (strcmp(name, "ball") == 0) return ball_about(w);
+  if (strcmp(name, "ellipsoid") == 0)
+    return batten_carrier_fit(w->run.ctx, n, w->cloud.count, w->cloud.points, &w->carrier);
+  batten_status st = batten_load_carrier(w->run.ctx, name, &w->carrier);
+  if (st < 0) return st;
+  batten_carrier_parts parts;
+  batten_carrier_get_parts(w->carrier, &parts);
+  if (parts.n != n)
+    return batten_fail(w->run.ctx, BATTEN_E_INVALID, "%s: a carrier of dimension %u for points of dimension %u", name,
+                       parts.n, n);
+  return BATTEN_OK;
+}
+
+/* The worse of two statuses that both mean done: the first that warns is kept. */
+static void note(solid_work *w, batten_status st) {
+  cli_run_warn(&w->run, st);
+  if (w->status == BATTEN_OK) w->status = st;
+}
+
+static batten_status fit(solid_work *w) {
+  batten_solid_options o = w->request->fit;
+  o.carrier = w->carrier;
+  o.normals = o.orientation == BATTEN_ORIENT_NEVER ? NULL : w->cloud.normals;
+  batten_status st =
+      batten_solid_fit(w->run.ctx, w->cloud.n, w->cloud.count, w->cloud.points, &o, &w->solid, &w->info);
+  if (st > 0) note(w, st);
+  return st;
+}
+
+static batten_status make_surface(solid_work *w) {
+  double start = batten_now();
+  batten_context *ctx = w->run.ctx;
+  batten_field field = batten_solid_field(w->solid);
+  size_t count;
+  const double *seeds = batten_solid_points(w->solid, &count);
+  batten_status st =
+      w->cloud.n == 2
+          ? batten_trace_outline(ctx, &field, count, seeds, &w->request->surface, &w->outline, &w->surface)
+          : batten_polygonize(ctx, &field, count, seeds, &w->request->surface, &w->mesh, &w->surface);
+  w->time_surface_s = batten_now() - start;
+  if (st > 0) note(w, st);
+  if (st < 0 || !w->mesh) return st;
+  st = batten_mesh_measure(ctx, w->mesh, &w->measures);
+  if (st >= 0) st = batten_mesh_self_intersections(ctx, w->mesh, &w->self_intersections);
+  return st < 0 ? st : solid_add_fields(w);
+}
+
+static batten_status draw(solid_work *w, const char *path) {
+  batten_picture_options o = w->request->picture;
+  size_t count;
+  const double *points = batten_solid_points(w->solid, &count);
+  if (w->request->dots || w->outline) {
+    o.points = points;
+    o.point_count = count;
+  }
+  if (w->outline) return batten_picture_outline(w->run.ctx, w->outline, &o, path);
+  static const char *const labels[] = {NULL, "|grad f|", "mean curvature", "Gaussian curvature"};
+  o.colors = solid_color_values(w);
+  o.color_label = labels[w->request->color];
+  return batten_picture_mesh(w->run.ctx, w->mesh, &o, path);
+}
+
+/* Everything to its staged name, the report last, for it tells the times of the others. */
+static int write_outputs(solid_work *w) {
+  solid_request *q = w->request;
+  double start = batten_now();
+  for (size_t i = 0; i < q->outputs.count; i++) {
+    const cli_output *f = &q->outputs.items[i];
+    const char *path = f->staged ? f->staged : f->target;
+    batten_status st = BATTEN_OK;
+    if (f->kind == CLI_OUTPUT_SURFACE)
+      st = w->outline ? batten_write_outline(w->run.ctx, w->outline, path)
+                      : batten_write_mesh(w->run.ctx, w->mesh, path);
+    else if (f->kind == CLI_OUTPUT_SOLID)
+      st = batten_save_solid(w->run.ctx, w->solid, path);
+    else if (f->kind == CLI_OUTPUT_PICTURE)
+      st = draw(w, path);
+    if (st < 0) return cli_run_failed(&w->run, st);
+  }
+  w->time_write_s = batten_now() - start;
+  cli_report report;
+  cli_report_open(&report);
+  solid_report(w, &report);
+  bool ok = true;
+  for (size_t i = 0; ok && i < q->outputs.count; i++) {
+    const cli_output *f = &q->outputs.items[i];
+    if (f->kind == CLI_OUTPUT_REPORT) ok = cli_report_write(&report, f->staged ? f->staged : f->target, f->path);
+  }
+  cli_report_close(&report);
+  cli_run_clear(&w->run);
+  if (cli_interrupted()) return cli_run_failed(&w->run, BATTEN_E_CANCELLED);
+  return ok && cli_outputs_commit(&q->outputs) ? CLI_DONE : CLI_FAILED;
+}
+
+static void work_free(solid_work *w) {
+  batten_outline_free(w->outline);
+  batten_mesh_free(w->mesh);
+  batten_solid_free(w->solid);
+  batten_carrier_free(w->carrier);
+  if (w->run.ctx) {
+    batten_cloud_free(w->run.ctx, &w->cloud);
+    batten_free(w->run.ctx, w->color);
+    cli_run_close(&w->run);
+  }
+}
+
+static int work(solid_request *q) {
+  solid_work w = {.request = q};
+  if (!cli_run_open(&w.run, q->threads, q->memory, q->quiet)) return CLI_FAILED;
+  int status;
+  batten_status st = read_points(&w);
+  if (st >= 0) {
+    status = check_dimension(&w);
+    if (status != CLI_DONE) goto done;
+    st = make_carrier(&w);
+  }
+  if (st >= 0) st = fit(&w);
+  if (st >= 0) st = make_surface(&w);
+  status = st < 0 ? cli_run_failed(&w.run, st) : write_outputs(&w);
+  if (status == CLI_DONE && !q->quiet) solid_summary(&w);
+done:
+  work_free(&w);
+  return status;
+}
+
+int cli_solid(int argc, char **argv) {
+  solid_request q = {.carrier = "auto",
+                     .fit = batten_solid_options_default(),
+                     .surface = batten_polygonize_options_default(),
+                     .picture = batten_picture_options_default()};
+  int status = parse(argc, argv, &q);
+  if (status == CLI_DONE && q.help)
+    print_help();
+  else if (status == CLI_DONE) {
+    bool usage;
+    if (cli_outputs_check(&q.outputs, q.input, &usage))
+      status = work(&q);
+    else
+      status = usage ? CLI_USAGE : CLI_FAILED;
+  }
+  cli_outputs_close(&q.outputs);
+  return status;
+}
