@@ -341,6 +341,12 @@ static batten_status make_surface(solid_work *w) {
   batten_field field = batten_solid_field(w->solid);
   size_t count;
   const double *seeds = batten_solid_points(w->solid, &count);
+  /* Lines are cheap: ten to the spacing of the points draw as curves, as far as the box does not take too many. */
+  if (w->cloud.n == 2 && w->request->surface.cell == 0) {
+    double lower[2], upper[2];
+    batten_solid_box(w->solid, lower, upper);
+    w->request->surface.cell = fmax(w->info.spacing / 10, 2e-4 * hypot(upper[0] - lower[0], upper[1] - lower[1]));
+  }
   batten_status st =
       w->cloud.n == 2
           ? batten_trace_outline(ctx, &field, count, seeds, &w->request->surface, &w->outline, &w->surface)

@@ -231,6 +231,73 @@ static void test_odd(batten_context *ctx) {
   batten_mesh_free(mesh);
 }
 
+/* ---- plane: a ring, whose area in pixels follows from its box --------------------------------------- */
+
+static batten_status ring(const void *user, batten_context *ctx, size_t count, const double *p, double *values,
+                          double *gradients, double *hessians) {
+  (void)user, (void)ctx, (void)gradients, (void)hessians;
+  for (size_t i = 0; values && i < count; i++) {
+    double r = hypot(p[2 * i] - 1, p[2 * i + 1] - 1);
+    values[i] = (r - 0.5) * (1 - r);
+  }
+  return BATTEN_OK;
+}
+
+static batten_outline *make_ring(batten_context *ctx) {
+  const double seeds[] = {2, 1, 1.5, 1};
+  batten_field field = {.dimension = 2, .evaluate = ring};
+  batten_polygonize_options o = batten_polygonize_options_default();
+  o.cell = 0.02;
+  o.lower[0] = o.lower[1] = -0.5;
+  o.upper[0] = o.upper[1] = 2.5;
+  batten_outline *outline = NULL;
+  batten_status st = batten_trace_outline(ctx, &field, 2, seeds, &o, &outline, NULL);
+  return st >= 0 ? outline : NULL;
+}
+
+static batten_status draw_ring(batten_context *ctx, void *arg) {
+  const double dots[] = {2, 1, 1, 2};
+  batten_outline *outline = make_ring(ctx);
+  if (!outline) return strstr(batten_error(ctx), "cancelled") ? BATTEN_E_CANCELLED : BATTEN_E_NOMEM;
+  batten_picture_options o = batten_picture_options_default();
+  o.width = 220, o.height = 200, o.title = "r < 1 & r > 0.5", o.points = dots, o.point_count = 2;
+  batten_status st = batten_picture_outline(ctx, outline, &o, arg);
+  batten_outline_free(outline);
+  return st;
+}
+
+static void test_ring(batten_context *ctx) {
+  static char svg[64];
+  snprintf(svg, sizeof svg, "%s/ring.svg", directory);
+  T_OK(draw_ring(ctx, path_a), ctx);
+  pixels p = read_png(path_a);
+  size_t blue = 0, x0 = 220, x1 = 0;
+  for (size_t y = 0; y < p.height; y++)
+    for (size_t x = 0; x < p.width; x++) {
+      const unsigned char *c = p.rgb + 3 * (y * p.width + x);
+      if (c[2] < c[0] + 25) continue; /* the fill, and the darker line about it */
+      blue++;
+      if (x < x0) x0 = x;
+      if (x > x1) x1 = x;
+    }
+  double diameter = (double)(x1 + 1 - x0), ratio = (double)blue / (3.14159265 / 4 * diameter * diameter);
+  T_RATIO(fabs(ratio - 0.75), 0.03, "a ring with its hole fills 3/4 of its disc: %.3f", ratio);
+  free(p.rgb);
+  T_OK(draw_ring(ctx, svg), ctx);
+  FILE *f = fopen(svg, "r");
+  static char text[1 << 17];
+  size_t length = f ? fread(text, 1, sizeof text - 1, f) : 0;
+  if (f) fclose(f);
+  T_CHECK(length && strncmp(text, "<svg ", 5) == 0 && strstr(text, "</svg>\n") == text + length - 7, "SVG is whole");
+  T_CHECK(strstr(text, "r &lt; 1 &amp; r &gt; 0.5</text>"), "and escapes what XML cannot hold");
+  size_t circles = 0;
+  for (const char *c = text; (c = strstr(c, "<circle")) != NULL; c++) circles++;
+  T_CHECK(circles == 2, "and has its dots");
+  t_fail_every_allocation("batten_picture_outline to SVG", draw_ring, svg);
+  unlink(svg);
+  T_STATUS(draw_ring(ctx, (void *)"ring.jpg"), BATTEN_E_INVALID, ctx, "use .svg or .png");
+}
+
 int main(void) {
   if (!mkdtemp(directory)) return 1;
   snprintf(path_a, sizeof path_a, "%s/a.png", directory);
@@ -242,6 +309,7 @@ int main(void) {
   test_ball(ctx, ball);
   test_odd(ctx);
   test_bad(ctx, ball);
+  test_ring(ctx);
   batten_mesh_free(ball);
   batten_context *three = t_context(NULL, NULL, 3);
   T_OK(draw_small(ctx, NULL), ctx);
