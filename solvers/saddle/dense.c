@@ -79,7 +79,7 @@ static batten_status factor_ldl(batten_saddle *s) {
   if (st < 0) return st;
   st = batten_la_sycon(s->ctx, order, s->a, order, s->pivots, norm, &s->info.rcond);
   if (st < 0) return st;
-  return s->info.rcond < DBL_EPSILON ? batten_saddle_dense_singular(s) : BATTEN_OK;
+  return s->info.rcond < BATTEN_SADDLE_RCOND_MIN ? batten_saddle_dense_singular(s) : BATTEN_OK;
 }
 
 static batten_status factor_qr(batten_saddle *s) {
@@ -96,7 +96,7 @@ static batten_status factor_qr(batten_saddle *s) {
   }
   st = batten_la_trcon(s->ctx, order, s->a, order, &s->info.rcond);
   if (st < 0) return st;
-  return zero || s->info.rcond < DBL_EPSILON ? batten_saddle_dense_singular(s) : BATTEN_OK;
+  return zero || s->info.rcond < BATTEN_SADDLE_RCOND_MIN ? batten_saddle_dense_singular(s) : BATTEN_OK;
 }
 
 batten_status batten_saddle_dense_factor(batten_saddle *s, batten_saddle_method method) {

@@ -239,9 +239,11 @@ static batten_status condition(batten_saddle *s, double norm) {
   if (st < 0) return st;
   s->info.rcond = v.b22.n == 0 ? 1 : 1 / (norm * inverse_norm);
   /* Refinement gains a digit a step while eps / rcond is well below 1. */
-  double limit = s->real == BATTEN_LA_DOUBLE ? DBL_EPSILON : 4 * (double)FLT_EPSILON;
+  double limit = s->real == BATTEN_LA_DOUBLE ? BATTEN_SADDLE_RCOND_MIN : 4 * (double)FLT_EPSILON;
   if (!(s->info.rcond >= limit))
-    return batten_fail(s->ctx, BATTEN_E_SINGULAR, "projected matrix: rcond %.3g is below %.3g", s->info.rcond, limit);
+    return batten_fail(s->ctx, BATTEN_E_SINGULAR,
+                       "matrix: not positive definite at row %zu to working precision: rcond %.3g is below %.3g",
+                       s->matrix.k + batten_rfp_weakest(&v.b22), s->info.rcond, limit);
   return BATTEN_OK;
 }
 

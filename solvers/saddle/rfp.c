@@ -126,6 +126,16 @@ batten_status batten_rfp_cholesky(batten_context *ctx, const batten_rfp *b, size
   return BATTEN_OK;
 }
 
+size_t batten_rfp_weakest(const batten_rfp *b) {
+  size_t weakest = 0;
+  double least = INFINITY;
+  for (size_t j = 0; j < b->n; j++) {
+    double value = absolute(b->real, j < b->n1 ? low(b, j, j) : high(b, j - b->n1, j - b->n1));
+    if (value < least) least = value, weakest = j;
+  }
+  return weakest;
+}
+
 /* ---- Triangular solves ---- */
 
 void batten_rfp_forward(const batten_rfp *b, size_t m, void *x, size_t ldx) {

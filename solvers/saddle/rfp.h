@@ -42,6 +42,9 @@ double batten_rfp_norm1(const batten_rfp *b, double *sums);
 /* B := L with B = L L'. Progress between blocks. SINGULAR: the leading minor of order *failed is not positive. */
 batten_status batten_rfp_cholesky(batten_context *ctx, const batten_rfp *b, size_t *failed);
 
+/* Row of the smallest diagonal entry of the factor (or of B). */
+size_t batten_rfp_weakest(const batten_rfp *b);
+
 /* x := L^-1 x and x := L^-T x for m columns, x [m][ldx] in B's precision. */
 void batten_rfp_forward(const batten_rfp *b, size_t m, void *x, size_t ldx);
 void batten_rfp_backward(const batten_rfp *b, size_t m, void *x, size_t ldx);

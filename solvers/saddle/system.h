@@ -49,6 +49,10 @@ struct batten_saddle {
   double *tau;           /* [N+k], QR */
 };
 
+/* A double factor with a smaller reciprocal condition counts as singular. 32: a pivot that should be 0 (duplicates)
+ * comes out as a few eps of either sign, and the estimate is within a factor of 3. */
+#define BATTEN_SADDLE_RCOND_MIN (32 * 0x1p-52)
+
 static inline size_t batten_saddle_order(const batten_saddle *s) { return s->matrix.n + s->matrix.k; }
 
 /* ---- tiles.c ---- */

@@ -56,14 +56,23 @@ typedef struct walk {
   size_t bad_row[WORKERS], bad_col[WORKERS];
 } walk;
 
+/* True when all values are finite: x - x is 0 for these and NaN for the others. Independent sums, for vectors. */
+static bool all_finite(size_t count, const double *x) {
+  double sums[LANES] = {0}, total = 0;
+  size_t i = 0;
+  for (; i + LANES <= count; i += LANES)
+    for (size_t l = 0; l < LANES; l++) sums[l] += x[i + l] - x[i + l];
+  for (; i < count; i++) total += x[i] - x[i];
+  for (size_t l = 0; l < LANES; l++) total += sums[l];
+  return total == 0;
+}
+
 static void find_bad(walk *w, size_t worker, const batten_saddle_tile *t) {
   size_t along = t->across ? t->cols : t->rows, columns = t->across ? t->rows : t->cols;
-  int bad = 0;
-  for (size_t j = 0; j < columns; j++)
-    for (size_t i = 0; i < along; i++) bad |= !(fabs(t->data[i + j * t->ld]) <= DBL_MAX);
-  for (size_t q = 0; bad && q < along * columns && !w->bad[worker]; q++) {
-    size_t i = q % along, j = q / along;
-    if (isfinite(t->data[i + j * t->ld])) continue;
+  for (size_t j = 0; j < columns && !w->bad[worker]; j++) {
+    const double *column = t->data + j * t->ld;
+    if (all_finite(along, column)) continue;
+    size_t i = batten_first_nonfinite(along, column);
     w->bad[worker] = true;
     w->bad_row[worker] = t->row0 + (t->across ? j : i);
     w->bad_col[worker] = t->col0 + (t->across ? i : j);

@@ -111,8 +111,8 @@ static void test_singular(batten_context *ctx) {
   scene_free(&s);
 
   /* Duplicates, wherever they stand. */
-  static const size_t pairs[][2] = {{0, 1}, {2, 90}, {50, 51}, {30, 99}};
-  for (size_t q = 0; q < 4; q++)
+  static const size_t pairs[][2] = {{0, 1}, {2, 90}, {50, 51}, {30, 99}, {4, 5}, {60, 70}, {7, 8}, {98, 99}};
+  for (size_t q = 0; q < sizeof pairs / sizeof *pairs; q++)
     for (int method = 0; method <= 4; method++) {
       s = scene_new(SCENE_RANDOM, KERNEL_R, 100, 4, 4 + q);
       char part[64];
