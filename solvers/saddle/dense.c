@@ -43,18 +43,13 @@ static batten_status assemble(batten_saddle *s, bool mirror) {
 size_t batten_saddle_dense_bytes(batten_saddle_method method, size_t n, size_t k) {
   size_t order, bytes, extra;
   if (!batten_add(n, k, &order) || !batten_mul3(order, order, sizeof(double), &bytes)) return SIZE_MAX;
-  size_t walk = batten_saddle_walk_bytes(n);
-  if (method == BATTEN_SADDLE_QR) {
-    size_t work = batten_la_geqrf_work(order, order) * sizeof(double);
-    size_t condition = order * (3 * sizeof(double) + sizeof(batten_la_int));
-    extra = work > condition ? work : condition;
-    extra = (extra > walk ? extra : walk) + order * sizeof(double);
-  } else {
-    size_t work = batten_la_sytrf_work(order) * sizeof(double);
-    size_t condition = order * (2 * sizeof(double) + sizeof(batten_la_int));
-    extra = work > condition ? work : condition;
-    extra = (extra > walk ? extra : walk) + order * sizeof(batten_la_int);
-  }
+  bool qr = method == BATTEN_SADDLE_QR;
+  size_t work = (qr ? batten_la_geqrf_work(order, order) : batten_la_sytrf_work(order)) * sizeof(double);
+  size_t condition = order * ((qr ? 3 : 2) * sizeof(double) + sizeof(batten_la_int));
+  size_t solve = batten_saddle_solve_bytes(n, k); /* more than a walk's */
+  extra = work > condition ? work : condition;
+  if (solve > extra) extra = solve;
+  extra += order * (qr ? sizeof(double) : sizeof(batten_la_int));
   return batten_add(bytes, extra, &bytes) ? bytes : SIZE_MAX;
 }
 

@@ -255,8 +255,9 @@ size_t batten_saddle_project_bytes(batten_la_real real, size_t n, size_t k) {
   size_t walk = batten_saddle_walk_bytes(n);
   size_t projection = 2 * head + 2 * k * k * sizeof(double) + 2 * rest * k * (size_t)real;
   size_t norms = rest * (2 * sizeof(double) + sizeof(batten_la_int) + (size_t)real);
-  size_t scratch = walk > projection ? walk : projection;
+  size_t scratch = walk > projection ? walk : projection, solve = batten_saddle_solve_bytes(n, k);
   if (norms > scratch) scratch = norms;
+  if (solve > scratch) scratch = solve;
   return batten_add(packed, head, &bytes) && batten_add(bytes, scratch, &bytes) ? bytes : SIZE_MAX;
 }
 

@@ -48,9 +48,11 @@ size_t batten_saddle_bytes(batten_saddle_method method, size_t n, size_t k) {
   return batten_add(bytes, fixed, &bytes) ? bytes : SIZE_MAX;
 }
 
-/* What the context still allows for a factor; what the handle itself holds is part of the prediction. */
+/* What the context still allows for a factor: what the handle itself holds is part of the prediction, and a factor
+ * at hand makes room for the next. */
 static size_t allowed_bytes(const batten_saddle *s) {
   size_t own = handle_bytes(s->matrix.k) + (s->qr.v ? qr_bytes(s->matrix.n, s->matrix.k) : 0), allowed;
+  if (s->factored) own += s->info.bytes;
   batten_add(batten_bytes_available(s->ctx), own, &allowed);
   return allowed;
 }
@@ -308,10 +310,10 @@ batten_status batten_saddle_solve(batten_context *ctx, batten_saddle *s, const d
   while (st == BATTEN_OK && f_norm > 0) {
     st = refine(s, f, f_norm, x, r, best, &stalled);
     if (st < 0 || !stalled || next_method(s->info.method) == BATTEN_SADDLE_AUTO) break;
-    /* A better factor helps only where rounding of the solution itself is not the limit. */
+    /* A better factor helps only where rounding of the solution itself is not the limit, and needs room. */
     double limit;
     st = attainable(s, f, best, f_norm, r, &limit);
-    if (st < 0 || s->info.residual <= limit) break;
+    if (st < 0 || s->info.residual <= limit || !fits(s, next_method(s->info.method))) break;
     s->info.fallbacks++;
     st = factor_from(s, next_method(s->info.method));
   }

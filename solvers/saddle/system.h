@@ -81,6 +81,11 @@ batten_status batten_saddle_probe_scale(batten_saddle *s);
 size_t batten_saddle_product_bytes(size_t n);
 batten_status batten_saddle_product(const batten_saddle *s, bool absolute, const double *x, double *y);
 
+/* Bytes that a solve takes beside the factor: its vectors, and the product of a residual. */
+static inline size_t batten_saddle_solve_bytes(size_t n, size_t k) {
+  return 3 * (n + k) * sizeof(double) + batten_saddle_product_bytes(n);
+}
+
 /* ---- project.c ---- */
 
 /* QR of P into s->qr, with p_scale; SINGULAR names the column that depends on others. */

@@ -11,6 +11,20 @@ static batten_status factor(batten_context *ctx, const batten_saddle_matrix *m, 
   return st;
 }
 
+/* Factor and solve. */
+static batten_status run(batten_context *ctx, const scene *s, batten_saddle_method method) {
+  batten_saddle_matrix m = scene_matrix(s);
+  batten_saddle_options o = batten_saddle_options_default();
+  batten_saddle *h = NULL;
+  double *w = malloc((s->n + s->k) * sizeof *w);
+  o.method = method;
+  batten_status st = batten_saddle_factor(ctx, &m, &o, &h);
+  if (st == BATTEN_OK) st = batten_saddle_solve(ctx, h, s->f, w, w + s->n);
+  batten_saddle_free(h);
+  free(w);
+  return st;
+}
+
 static void test_names(void) {
   static const char *const names[] = {"auto", "cholesky", "cholesky-mixed", "ldl", "qr"};
   for (int q = 0; q < 5; q++)
@@ -169,14 +183,70 @@ static void test_fallback(batten_context *ctx) {
   scene_free(&s);
 }
 
+/* A factor that turns out too poor for refinement, made so by changing the matrix under it: the next method takes
+ * over within the solve, or, where that has no room, the best solution comes with a warning. */
+static void test_stall(void) {
+  double w[300], c[4];
+  for (int room = 0; room < 2; room++) {
+    scene s = scene_new(SCENE_RANDOM, KERNEL_R, 300, 4, 16);
+    batten_saddle_matrix m = scene_matrix(&s);
+    batten_context_options co = batten_context_options_default();
+    batten_context *ctx = NULL;
+    /* With the solve's workspace there is room for the float factor alone, or for the double one too. */
+    co.memory_limit = batten_saddle_bytes(BATTEN_SADDLE_CHOLESKY_MIXED, 300, 4) + (room ? 10000000 : 0);
+    batten_context_new(&co, &ctx);
+    batten_saddle_options o = batten_saddle_options_default();
+    batten_saddle *h = NULL;
+    o.method = BATTEN_SADDLE_CHOLESKY_MIXED;
+    T_OK(batten_saddle_factor(ctx, &m, &o, &h), ctx);
+    s.nugget = 10;
+    if (room) {
+      T_OK(batten_saddle_solve(ctx, h, s.f, w, c), ctx);
+      T_RATIO(scene_check(&s, w, c).residual, 1.5e-13, "residual after the fall-back within the solve");
+    } else {
+      T_STATUS(batten_saddle_solve(ctx, h, s.f, w, c), BATTEN_W_ACCURACY, ctx, "above the tolerance");
+    }
+    batten_saddle_info info = batten_saddle_get_info(h);
+    T_CHECK(info.method == (room ? BATTEN_SADDLE_CHOLESKY : BATTEN_SADDLE_CHOLESKY_MIXED) && (int)info.fallbacks == room,
+            "%s after %u fall-backs, residual %.2g", batten_saddle_method_name(info.method), info.fallbacks, info.residual);
+    batten_saddle_free(h);
+    T_CHECK(batten_bytes_in_use(ctx) == 0, "all memory is given back");
+    batten_context_free(ctx);
+    scene_free(&s);
+  }
+}
+
+/* The same while allocations fail and the host cancels: the handle stays usable. */
+static batten_status stall(batten_context *ctx, void *arg) {
+  scene *s = arg;
+  double w[40] = {77}, c[4];
+  batten_saddle_matrix m = scene_matrix(s);
+  batten_saddle_options o = batten_saddle_options_default();
+  batten_saddle *h = NULL;
+  o.method = BATTEN_SADDLE_CHOLESKY_MIXED;
+  s->nugget = 0;
+  batten_status st = batten_saddle_factor(ctx, &m, &o, &h);
+  if (st < 0) return st;
+  s->nugget = 10;
+  st = batten_saddle_solve(ctx, h, s->f, w, c);
+  if (st < 0) {
+    if (w[0] != 77) t_line(false, "w is untouched on failure");
+    batten_status again = batten_saddle_solve(ctx, h, s->f, w, c);
+    if (again == BATTEN_OK && scene_check(s, w, c).residual > 1.5e-13) t_line(false, "the handle stays usable");
+    if (again < 0 && again != st) t_line(false, "second failure: %s", batten_error(ctx));
+  }
+  batten_saddle_free(h);
+  return st;
+}
+
 static void test_memory(void) {
   static const size_t sizes[] = {1000, 1001, 1400};
   for (size_t q = 0; q < 3; q++)
     for (int method = 1; method <= (q == 0 ? 4 : 3); method++) {
       scene s = scene_new(SCENE_RANDOM, KERNEL_R, sizes[q], 4, 12);
+      for (size_t i = 0; i < s.n; i++) s.f[i] = 1 + 0.3 * s.x[3 * i] * s.x[3 * i + 1];
       batten_context *ctx = t_context(NULL, NULL, 2);
-      batten_saddle_matrix m = scene_matrix(&s);
-      T_OK(factor(ctx, &m, (batten_saddle_method)method), ctx);
+      T_OK(run(ctx, &s, (batten_saddle_method)method), ctx);
       double predicted = (double)batten_saddle_bytes((batten_saddle_method)method, s.n, s.k);
       double peak = (double)batten_bytes_peak(ctx);
       T_CHECK(predicted >= peak, "prediction %.0f covers the peak %.0f", predicted, peak);
@@ -188,11 +258,11 @@ static void test_memory(void) {
       batten_context_options o = batten_context_options_default();
       o.memory_limit = (size_t)predicted;
       batten_context_new(&o, &ctx);
-      T_OK(factor(ctx, &m, (batten_saddle_method)method), ctx);
+      T_OK(run(ctx, &s, (batten_saddle_method)method), ctx);
       batten_context_free(ctx);
       o.memory_limit--;
       batten_context_new(&o, &ctx);
-      T_STATUS(factor(ctx, &m, (batten_saddle_method)method), BATTEN_E_TOO_LARGE, ctx, "bytes, the context allows");
+      T_STATUS(run(ctx, &s, (batten_saddle_method)method), BATTEN_E_TOO_LARGE, ctx, "bytes, the context allows");
       T_CHECK(batten_bytes_peak(ctx) < 10000, "refused before anything large is taken: %zu", batten_bytes_peak(ctx));
       batten_context_free(ctx);
       scene_free(&s);
@@ -300,11 +370,15 @@ int main(void) {
   test_bad_entries(ctx);
   test_singular(ctx);
   test_fallback(ctx);
+  test_stall();
   test_memory();
   test_accepted();
   scene s = scene_new(SCENE_RANDOM, KERNEL_R, 40, 4, 15);
   t_fail_every_allocation("saddle", everything, &s);
   t_cancel_every_progress("saddle", everything, &s);
+  t_fail_every_allocation("saddle with a stall", stall, &s);
+  t_cancel_every_progress("saddle with a stall", stall, &s);
+  s.nugget = 0;
   s.factor = -1; /* through all fall-backs */
   t_fail_every_allocation("saddle with fall-backs", everything, &s);
   t_cancel_every_progress("saddle with fall-backs", everything, &s);
