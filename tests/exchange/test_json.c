@@ -1,8 +1,6 @@
 /* Documents: same bits back for every kind of carrier in 1, 2 and 3 dimensions, gradients, nesting; what is refused. */
 #include "files.h"
 
-#include <locale.h>
-
 enum { PROBES = 40 };
 
 static void probes(unsigned n, double *x) {
@@ -328,12 +326,6 @@ int main(void) {
   }
   test_solid(ctx, &s, 2, true);
   test_solid(ctx, &s, 3, true);
-  if (setlocale(LC_ALL, "de_DE.UTF-8") && *localeconv()->decimal_point == ',') {
-    test_solid(ctx, &s, 3, false);
-    setlocale(LC_ALL, "C");
-  } else {
-    t_skip("documents under a locale with a decimal comma", "none on this machine");
-  }
   test_refused(ctx);
   test_depth(ctx);
   test_callback(ctx, &s);

@@ -1,7 +1,6 @@
-/* Points from every format: small files by hand, encodings, locale, gzip, failures of memory, cancelling. */
+/* Points from every format: small files by hand, encodings, gzip, failures of memory, cancelling. */
 #include "files.h"
 
-#include <locale.h>
 #include <zlib.h>
 
 /* What each small file must give: n, points, normals. */
@@ -142,19 +141,6 @@ static void test_dimension(batten_context *ctx) {
   T_CHECK(c.points == NULL, "the result is untouched");
 }
 
-/* A locale with a decimal comma changes nothing. */
-static void test_locale(batten_context *ctx) {
-  static const char *const names[] = {"de_DE.UTF-8", "de_DE.utf8", "fr_FR.UTF-8", "fr_FR.utf8", "de_DE", "fr_FR"};
-  const char *found = NULL;
-  for (size_t i = 0; !found && i < sizeof names / sizeof names[0]; i++) found = setlocale(LC_ALL, names[i]);
-  if (!found || *localeconv()->decimal_point != ',') {
-    t_skip("a locale with a decimal comma", "none on this machine");
-  } else {
-    T_CHECK(differing(ctx) == 0, "all samples under the locale %s", found);
-  }
-  setlocale(LC_ALL, "C");
-}
-
 static size_t compress_text(const char *text, size_t size, unsigned char *out, size_t room) {
   z_stream z = {.next_in = (unsigned char *)(uintptr_t)text, .avail_in = (unsigned)size, .next_out = out,
                 .avail_out = (unsigned)room};
@@ -279,7 +265,6 @@ int main(void) {
   test_samples(ctx);
   test_binary(ctx);
   test_dimension(ctx);
-  test_locale(ctx);
   test_gzip(ctx);
   test_long_lines(ctx);
   test_files(ctx);

@@ -29,35 +29,48 @@ typedef struct batten_read_points_options {
 } batten_read_points_options;
 BATTEN_API batten_read_points_options batten_read_points_options_default(void);
 
-/* XYZ, TXT, CSV (comma, semicolon, tab or blanks; # and // comments; one header line of names is recognised and may
- * order the columns x, y, z, nx, ny, nz), PLY (ASCII, both binary orders), OBJ, OFF, STL (vertices). Free with batten_cloud_free.
- * Fails: IO, FORMAT, INVALID (unknown extension: lists the known), NOMEM, CANCELLED. */
+/* By extension, each also with .gz:
+ *   .xyz .txt .csv .tsv .asc .dat   text: separated by semicolons, else commas, else blanks; # % // comments. Without
+ *             names 2 columns are x y, 3 x y z, 4 x y nx ny, 6 x y z nx ny nz; others need a line of names above the
+ *             numbers (also as a comment), from which x, y, z, nx, ny, nz are taken in any order.
+ *   .ply      ASCII and both binary orders; nx ny nz are the normals; the vertices are planar without z
+ *   .obj      v and vn: normals where every vertex has one      .off  also NOFF, COFF, STOFF
+ *   .stl      ASCII and binary; the corners, equal ones once
+ * Numbers must be finite. Free with batten_cloud_free. Fails: IO, FORMAT, INVALID (unknown extension: lists the
+ * known), NOMEM, TOO_LARGE, CANCELLED; *out untouched then. */
 BATTEN_API batten_status batten_read_points(batten_context *ctx, const char *path,
                                             const batten_read_points_options *opt, batten_cloud *out);
 BATTEN_API void batten_cloud_free(batten_context *ctx, batten_cloud *cloud);
 
 /* ---- meshes ------------------------------------------------------------------------------------- */
 
-/* PLY, OBJ, OFF, STL (ASCII and binary; equal vertices are welded). Polygons are cut into fans. */
+/* .ply .obj .off .stl, each also with .gz. Polygons are cut into fans around their first corner; equal corners of STL
+ * become one vertex, and triangles that lose a corner by that are dropped. Further numbers at the vertices of PLY and
+ * the normals of PLY and NOFF become fields of one component (normals: nx, ny, nz). Fails as batten_read_points. */
 BATTEN_API batten_status batten_read_mesh(batten_context *ctx, const char *path, batten_mesh **out);
 
-/* PLY (binary little endian, double), OBJ, STL (binary), OFF, VTK XML (.vtp, and .vtu) with all fields of the mesh. */
+/* .ply (binary little endian, double; all fields, those of several components as NAME_0, NAME_1, ...), .obj, .off,
+ * .stl (binary, single precision), and VTK XML .vtp and .vtu with all fields. Fails: IO, INVALID (unknown extension:
+ * lists the known; STL beyond single precision), NOMEM; what stood under the name is then as it was. */
 BATTEN_API batten_status batten_write_mesh(batten_context *ctx, const batten_mesh *mesh, const char *path);
 
-/* Outlines of plane solids: .svg, .csv / .xyz / .txt (blocks of x y), .vtp, .obj (lines). */
+/* Outlines of plane solids: .svg, .csv .xyz .txt (x y; a blank line between loops, closed ones end with their first
+ * corner again), .vtp, .obj (lines). Fails as batten_write_mesh. */
 BATTEN_API batten_status batten_write_outline(batten_context *ctx, const batten_outline *outline, const char *path);
 
 /* ---- batten's own JSON documents ---------------------------------------------------------------- */
 
-/* {"batten": "solid", "version": 1, ...}; carriers nest, also solids in carriers. Same bits back. A callback carrier
- * cannot be saved: INVALID. */
+/* {"batten": "solid", "version": 1, ...}; carriers nest, also solids in carriers. Evaluates to the same bits when it
+ * is back. A callback carrier cannot be saved: INVALID. Loading checks everything and names the place:
+ * "a.json: solid.spline.centers[17][2]: ..." (FORMAT). While a document is parsed, its tree is in memory that is not
+ * the context's: the JSON library (Jansson) has one allocator for the whole process, which is the host's to set. */
 BATTEN_API batten_status batten_save_solid(batten_context *ctx, const batten_solid *solid, const char *path);
 BATTEN_API batten_status batten_load_solid(batten_context *ctx, const char *path, batten_solid **out);
 /* A carrier alone: {"batten": "carrier", "version": 1, "carrier": {...}}. */
 BATTEN_API batten_status batten_save_carrier(batten_context *ctx, const batten_carrier *carrier, const char *path);
 BATTEN_API batten_status batten_load_carrier(batten_context *ctx, const char *path, batten_carrier **out);
 
-/* What a file holds, by content and extension. */
+/* What a file holds, by extension and content; only as much is read as that takes. Fails: IO, FORMAT. */
 typedef enum batten_file_kind {
   BATTEN_FILE_UNKNOWN = 0,
   BATTEN_FILE_POINTS,
