@@ -168,11 +168,6 @@ static bool has_equal_points(const batten_orient_graph *graph) {
   return i < graph->count;
 }
 
-/* What speaks against normals, 0 .. 2: neighbours that oppose each other, and a surface that does not close. */
-static double doubt(const batten_orient_graph *graph, const double *normals) {
-  return batten_orient_conflicts(graph, normals) + batten_orient_openness(graph, normals);
-}
-
 batten_status batten_orient(batten_context *ctx, unsigned n, size_t count, const double *points,
                             batten_orient_method method, size_t energy_points, double *normals,
                             batten_orient_method *method_used, double *lambda_used) {
@@ -197,7 +192,8 @@ batten_status batten_orient(batten_context *ctx, unsigned n, size_t count, const
                    : orient_subset(ctx, &graph, planes, energy_points, energy, &lambda);
     bool automatic = method == BATTEN_ORIENT_METHOD_AUTO;
     if (status < 0 && !(automatic && status == BATTEN_E_SINGULAR)) goto done;
-    if (status >= 0 && !(automatic && doubt(&graph, energy) > doubt(&graph, planes) + DOUBT))
+    if (status >= 0 &&
+        !(automatic && batten_orient_doubt(&graph, energy) > batten_orient_doubt(&graph, planes) + DOUBT))
       used = BATTEN_ORIENT_METHOD_ENERGY;
     status = BATTEN_OK;
   }

@@ -5,7 +5,8 @@
  *
  *   lambda   weight of smoothing: f minimises |f|^2 + sum f(x_i)^2 / lambda. A large one passes over noise and uneven
  * samples but blurs thin walls; so lambda walks down from 1e-2 in the unit size, each step starts from the last one's
- *            result, and where no sign moved over a step, the orientation is settled. (A sphere of diameter 1 with
+ *            result, and where no sign moved over a step, the orientation is settled. Where the normals get rougher
+ * instead (batten_orient_doubt), noise has taken over, and the step before counts. (A sphere of diameter 1 with
  * lambda = 1e-2: values may leave 0 by some percent of the diameter.) starts   at every lambda also the eigenvector
  * of M's smallest eigenvalue, at the first also the local planes: the result of least energy goes on. pieces   a
  * patch, a sheet or a component that is turned round as a whole is a valley of its own: the neighbour graph falls
@@ -26,6 +27,8 @@ enum { LAMBDAS = sizeof LAMBDA / sizeof *LAMBDA };
 /* Neighbours whose normals agree by less belong to different pieces: 72 degrees beside the circle through both. */
 static const double PIECE_AGREEMENT = 0.3;
 
+static const double DOUBT_GROWTH = 0.05; /* over a step: what resolved features of 1 in 20 points may add */
+
 typedef struct candidate {
   double *g, *mg; /* [N][n] */
   double energy;
@@ -43,15 +46,20 @@ static void exchange(candidate *a, candidate *b) {
   *b = t;
 }
 
-/* Turns single pieces of best while that lowers the energy. Work: trial; piece [N]. True when something was turned.
- */
+/* Turns single pieces of best while that lowers the energy, the largest first. Work: trial, piece, size [N]. True
+ * when something was turned. */
 static bool turn_pieces(const batten_orient_graph *graph, const batten_orient_system *s, candidate *best,
-                        candidate *trial, size_t *piece) {
+                        candidate *trial, size_t *piece, size_t *size) {
   unsigned n = s->n;
   size_t pieces = batten_orient_pieces(graph, best->g, PIECE_AGREEMENT, piece);
   bool turned = false;
-  if (pieces == 1 || pieces > TURNS_MAX) return false;
-  for (size_t p = 0; p < pieces; p++) {
+  memset(size, 0, pieces * sizeof *size);
+  for (size_t i = 0; i < s->count; i++) size[piece[i]]++;
+  for (size_t turn = 0; pieces > 1 && turn < pieces && turn < TURNS_MAX; turn++) {
+    size_t p = 0;
+    for (size_t q = 1; q < pieces; q++)
+      if (size[q] > size[p]) p = q;
+    size[p] = 0; /* tried */
     for (size_t i = 0; i < s->size; i++) trial->g[i] = piece[i / n] == p ? best->g[i] : 0;
     batten_orient_system_solve(s, trial->g, trial->mg);
     double change = 4 * (dot(s->size, trial->g, trial->mg) - dot(s->size, trial->g, best->mg));
@@ -68,9 +76,9 @@ static bool turn_pieces(const batten_orient_graph *graph, const batten_orient_sy
 
 /* Minimum at the system's lambda from best's gradients; then by turning pieces. */
 static batten_status descend(batten_context *ctx, const batten_orient_graph *graph, const batten_orient_system *s,
-                             double part, candidate *best, candidate *trial, size_t *piece) {
+                             double part, candidate *best, candidate *trial, size_t *piece, size_t *size) {
   batten_status status = batten_orient_minimize(ctx, s, part, best->g, best->mg, &best->energy);
-  for (int round = 0; status >= 0 && round < TURN_ROUNDS && turn_pieces(graph, s, best, trial, piece); round++)
+  for (int round = 0; status >= 0 && round < TURN_ROUNDS && turn_pieces(graph, s, best, trial, piece, size); round++)
     status = batten_orient_minimize(ctx, s, part, best->g, best->mg, &best->energy);
   return status;
 }
@@ -84,14 +92,15 @@ static size_t moved(unsigned n, size_t count, const double *g, const double *h) 
 
 typedef struct workspace {
   candidate best, other, trial;
-  double *last;  /* [N][n] best gradients of the last lambda */
-  size_t *piece; /* [N] */
+  double *last;         /* [N][n] best gradients of the last lambda */
+  size_t *piece, *size; /* [N] */
 } workspace;
 
 /* The walk along lambda; ends with the result in best and the system factored at its lambda. */
 static batten_status walk(batten_context *ctx, const batten_orient_graph *graph, batten_orient_system *s,
                           const double *start, workspace *w) {
   size_t bytes = s->size * sizeof(double);
+  double least = INFINITY; /* doubt so far */
   memcpy(w->best.g, start, bytes);
   for (int step = 0; step < LAMBDAS; step++) {
     double part = (step + 0.5) / LAMBDAS;
@@ -101,10 +110,16 @@ static batten_status walk(batten_context *ctx, const batten_orient_graph *graph,
     if (status == BATTEN_E_SINGULAR && step > 0) return batten_orient_system_factor(ctx, s, LAMBDA[step - 1]);
     if (status < 0) return status;
     memcpy(w->last, w->best.g, bytes);
-    if ((status = descend(ctx, graph, s, part, &w->best, &w->trial, w->piece)) < 0) return status;
+    if ((status = descend(ctx, graph, s, part, &w->best, &w->trial, w->piece, w->size)) < 0) return status;
     if ((status = batten_orient_eigenvector(ctx, s, part, w->other.g)) < 0) return status;
-    if ((status = descend(ctx, graph, s, part, &w->other, &w->trial, w->piece)) < 0) return status;
+    if ((status = descend(ctx, graph, s, part, &w->other, &w->trial, w->piece, w->size)) < 0) return status;
     if (w->other.energy < w->best.energy * (1 - 1e-6)) exchange(&w->best, &w->other);
+    double doubt = batten_orient_doubt(graph, w->best.g);
+    if (doubt > least + DOUBT_GROWTH) {
+      memcpy(w->best.g, w->last, bytes);
+      return batten_orient_system_factor(ctx, s, LAMBDA[step - 1]);
+    }
+    least = fmin(least, doubt);
     if (step > 0 && moved(s->n, s->count, w->best.g, w->last) == 0) break;
   }
   return BATTEN_OK;
@@ -146,7 +161,8 @@ batten_status batten_orient_energy(batten_context *ctx, const batten_orient_grap
   *field = (batten_orient_field){0};
   batten_status status = BATTEN_E_NOMEM;
   double *memory = batten_alloc_array(ctx, size, 7 * sizeof *memory);
-  if (!memory || !(w.piece = batten_alloc_array(ctx, graph->count, sizeof *w.piece))) goto done;
+  if (!memory || !(w.piece = batten_alloc_array(ctx, graph->count, 2 * sizeof *w.piece))) goto done;
+  w.size = w.piece + graph->count;
   double **blocks[] = {&w.best.g, &w.best.mg, &w.other.g, &w.other.mg, &w.trial.g, &w.trial.mg, &w.last};
   for (size_t i = 0; i < sizeof blocks / sizeof *blocks; i++) *blocks[i] = memory + i * size;
   if ((status = batten_orient_system_new(ctx, graph->n, graph->count, graph->points, &system)) < 0) goto done;

@@ -120,26 +120,21 @@ double batten_orient_agreement(unsigned n, const double *a, const double *b, con
   return square > 0 ? agreement - 2 * dot(n, e, u) * dot(n, e, v) / square : agreement;
 }
 
-double batten_orient_conflicts(const batten_orient_graph *g, const double *normals) {
+/* Mean of (1 - agreement) / 2 over the neighbour pairs: 1/2 for random normals. */
+static double roughness(const batten_orient_graph *g, const double *normals) {
   unsigned n = g->n;
-  size_t alike = 0, opposed = 0;
+  double sum = 0;
   for (size_t i = 0; i < g->count; i++)
     for (size_t q = 0; q < g->k; q++) {
       size_t j = g->index[i * g->k + q];
-      const double *p = g->plane + i * n, *r = g->plane + j * n, *x = g->points;
-      double agreement = batten_orient_agreement(n, x + i * n, x + j * n, p, r);
-      double up = dot(n, p, normals + i * n), ur = dot(n, r, normals + j * n);
-      /* planes that mean something, fit to one surface (37 degrees), and are what the normals mean, too (45 degrees)
-       */
-      if (fmin(g->flatness[i], g->flatness[j]) < 0.5 || fabs(agreement) < 0.8 || fmin(fabs(up), fabs(ur)) < 0.7)
-        continue;
-      alike++;
-      opposed += agreement * up * ur < 0;
+      sum += 1 - batten_orient_agreement(n, g->points + i * n, g->points + j * n, normals + i * n, normals + j * n);
     }
-  return alike ? (double)opposed / (double)alike : 0;
+  return sum / (2 * (double)g->count * (double)g->k);
 }
 
-double batten_orient_openness(const batten_orient_graph *g, const double *normals) {
+/* |sum of area_i normal_i| / sum of area_i: 0 for a closed surface (divergence theorem), 1 for a sheet. The areas are
+ * those of the disks (lengths of the pieces) that hold the neighbours. */
+static double openness(const batten_orient_graph *g, const double *normals) {
   double sum[3] = {0}, total = 0;
   for (size_t i = 0; i < g->count; i++) {
     double area = pow(g->distance[i * g->k + g->k - 1], g->n - 1.0);
@@ -147,6 +142,10 @@ double batten_orient_openness(const batten_orient_graph *g, const double *normal
     total += area;
   }
   return total > 0 ? sqrt(dot(g->n, sum, sum)) / total : 1;
+}
+
+double batten_orient_doubt(const batten_orient_graph *g, const double *normals) {
+  return roughness(g, normals) + openness(g, normals);
 }
 
 size_t batten_orient_pieces(const batten_orient_graph *g, const double *normals, double threshold, size_t *piece) {
