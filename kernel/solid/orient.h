@@ -30,13 +30,16 @@ void batten_orient_graph_free(batten_context *ctx, batten_orient_graph *graph);
  * the same with one of them turned round. About 0: nothing can be said. */
 double batten_orient_agreement(unsigned n, const double *a, const double *b, const double *u, const double *v);
 
+/* Area (length) that point i stands for: its share of the disk that holds it and its neighbours. */
+double batten_orient_area(const batten_orient_graph *graph, size_t i);
+
 /* What speaks against normals: roughness in [0, 1], the mean of (1 - agreement) / 2 over the neighbour pairs, plus
  * openness in [0, 1], |sum of area_i normal_i| / sum of area_i. Right normals of closed surfaces have 0.01 to 0.25
  * (noise, edges), random ones 0.5, a wall taken for one sheet 1. */
 double batten_orient_doubt(const batten_orient_graph *graph, const double *normals);
 
-/* Labels piece[i] < return value: points joined by neighbour pairs whose normals agree by more than `threshold`. With
- * threshold -2 the connected components of the neighbour graph. Numbered by their lowest point. */
+/* Labels piece[i] < return value: points joined by neighbour pairs whose normals agree by more than `threshold`.
+ * Numbered by their lowest point. */
 size_t batten_orient_pieces(const batten_orient_graph *graph, const double *normals, double threshold, size_t *piece);
 
 /* Sum over fixed directions of (normal at the extreme point) . direction: positive when normals look outwards. Of the

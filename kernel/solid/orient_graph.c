@@ -120,6 +120,12 @@ double batten_orient_agreement(unsigned n, const double *a, const double *b, con
   return square > 0 ? agreement - 2 * dot(n, e, u) * dot(n, e, v) / square : agreement;
 }
 
+double batten_orient_area(const batten_orient_graph *g, size_t i) {
+  const double pi = 3.141592653589793;
+  double radius = g->distance[i * g->k + g->k - 1];
+  return (g->n == 2 ? 2 * radius : pi * radius * radius) / (double)(g->k + 1);
+}
+
 /* Mean of (1 - agreement) / 2 over the neighbour pairs: 1/2 for random normals. */
 static double roughness(const batten_orient_graph *g, const double *normals) {
   unsigned n = g->n;
@@ -137,7 +143,7 @@ static double roughness(const batten_orient_graph *g, const double *normals) {
 static double openness(const batten_orient_graph *g, const double *normals) {
   double sum[3] = {0}, total = 0;
   for (size_t i = 0; i < g->count; i++) {
-    double area = pow(g->distance[i * g->k + g->k - 1], g->n - 1.0);
+    double area = batten_orient_area(g, i);
     for (unsigned c = 0; c < g->n; c++) sum[c] += area * normals[i * g->n + c];
     total += area;
   }
@@ -155,8 +161,8 @@ size_t batten_orient_pieces(const batten_orient_graph *g, const double *normals,
   for (size_t i = 0; i < g->count; i++)
     for (size_t q = 0; q < g->k; q++) {
       size_t j = g->index[i * g->k + q], a = i, b = j;
-      if (threshold > -1 && batten_orient_agreement(n, g->points + i * n, g->points + j * n, normals + i * n,
-                                                    normals + j * n) <= threshold)
+      if (batten_orient_agreement(n, g->points + i * n, g->points + j * n, normals + i * n, normals + j * n) <=
+          threshold)
         continue;
       while (piece[a] != a) a = piece[a] = piece[piece[a]];
       while (piece[b] != b) b = piece[b] = piece[piece[b]];

@@ -1,11 +1,11 @@
 /* Orientation by local planes: cheap, for many points.   [after Hoppe, DeRose, Duchamp, McDonald, Stuetzle 1992]
  *
  *   1. Each pair of neighbours ties the signs of two planes, the firmer the better the planes fit to one surface and
- * the more the pair lies in both (batten_orient_agreement).
+ *      the more the pair lies in both (batten_orient_agreement).
  *   2. Kruskal's minimum spanning forest settles the firmest ties first; a union-find with parity carries the signs,
- * so no walk over the tree is needed.
- *   3. Each component of the neighbour graph is turned so that its extreme points look outwards, and turned round
- * again when it lies inside an odd number of the others (winding numbers): the walls of cavities.
+ *      so no walk over the tree is needed. Loose ties do not join what is closed already: bodies that nearly touch.
+ *   3. Each tree is turned so that its extreme points look outwards, and turned round again when it lies inside
+ *      an odd number of the others (winding numbers): the walls of cavities.
  *
  * Time O(N log N) + (components whose boxes overlap) x N. */
 #include <math.h>
@@ -13,6 +13,10 @@
 
 #include "base/checked.h"
 #include "orient.h"
+
+/* A tie with less than 0.3 left of its agreement does not join two trees that are closed surfaces already. */
+static const double LOOSE = 0.7;
+static const double CLOSED = 0.1; /* openness of random samples of a torus: 0.03 */
 
 typedef struct tie {
   double weight; /* 0 firm .. 1 loose */
@@ -61,33 +65,68 @@ static size_t find_root(size_t *parent, unsigned char *turned, size_t i) {
   return parent[i];
 }
 
-static void propagate(const batten_orient_graph *g, size_t count, const tie *ties, size_t *parent,
-                      unsigned char *turned, unsigned char *rank, double *normals) {
+/* Signed area so far of the tree below a root. */
+typedef struct area {
+  double sum[3], total;
+} area;
+
+static bool closed(const area *a, unsigned n) {
+  double square = 0;
+  for (unsigned c = 0; c < n; c++) square += a->sum[c] * a->sum[c];
+  return square < CLOSED * CLOSED * a->total * a->total;
+}
+
+typedef struct forest {
+  size_t *parent, *piece; /* [count] */
+  unsigned char *turned, *rank;
+  area *areas;
+} forest;
+
+static void plant(const batten_orient_graph *g, forest *f) {
   unsigned n = g->n;
-  for (size_t i = 0; i < g->count; i++) parent[i] = i;
-  memset(turned, 0, g->count);
-  memset(rank, 0, g->count);
-  for (size_t t = 0; t < count; t++) {
-    size_t i = ties[t].from / g->k, j = g->index[ties[t].from];
-    size_t a = find_root(parent, turned, i), b = find_root(parent, turned, j);
-    if (a == b) continue;
-    double agreement =
-        batten_orient_agreement(n, g->points + i * n, g->points + j * n, g->plane + i * n, g->plane + j * n);
-    unsigned char opposed = (unsigned char)((agreement < 0) ^ (i != a && turned[i]) ^ (j != b && turned[j]));
-    if (rank[a] < rank[b]) {
-      size_t r = a;
-      a = b;
-      b = r;
-    }
-    if (rank[a] == rank[b]) rank[a]++;
-    parent[b] = a;
-    turned[b] = opposed;
-  }
   for (size_t i = 0; i < g->count; i++) {
-    size_t root = find_root(parent, turned, i);
-    double sign = i != root && turned[i] ? -1 : 1;
-    for (unsigned c = 0; c < n; c++) normals[i * n + c] = sign * g->plane[i * n + c];
+    f->parent[i] = i;
+    f->turned[i] = f->rank[i] = 0;
+    f->areas[i].total = batten_orient_area(g, i);
+    for (unsigned c = 0; c < 3; c++) f->areas[i].sum[c] = c < n ? f->areas[i].total * g->plane[i * n + c] : 0;
   }
+}
+
+/* Joins the trees of i and j, whose planes agree up to sign. */
+static void join(const batten_orient_graph *g, const tie *t, forest *f) {
+  size_t i = t->from / g->k, j = g->index[t->from];
+  size_t a = find_root(f->parent, f->turned, i), b = find_root(f->parent, f->turned, j);
+  if (a == b || (t->weight > LOOSE && closed(&f->areas[a], g->n) && closed(&f->areas[b], g->n))) return;
+  const double *x = g->points, *u = g->plane;
+  double agreement = batten_orient_agreement(g->n, x + i * g->n, x + j * g->n, u + i * g->n, u + j * g->n);
+  bool opposed = (agreement < 0) != ((i != a && f->turned[i]) != (j != b && f->turned[j]));
+  if (f->rank[a] < f->rank[b]) {
+    size_t r = a;
+    a = b;
+    b = r;
+  }
+  if (f->rank[a] == f->rank[b]) f->rank[a]++;
+  f->parent[b] = a;
+  f->turned[b] = opposed;
+  f->areas[a].total += f->areas[b].total;
+  for (unsigned c = 0; c < 3; c++) f->areas[a].sum[c] += opposed ? -f->areas[b].sum[c] : f->areas[b].sum[c];
+}
+
+/* Steps 1 and 2. piece [count]: label of each point's component, numbered by first point. Returns how many. */
+static size_t propagate(const batten_orient_graph *g, size_t count, const tie *ties, forest *f, double *normals) {
+  unsigned n = g->n;
+  size_t pieces = 0;
+  plant(g, f);
+  for (size_t t = 0; t < count; t++) join(g, ties + t, f);
+  for (size_t i = 0; i < g->count; i++) f->piece[i] = SIZE_MAX;
+  for (size_t i = 0; i < g->count; i++) {
+    size_t root = find_root(f->parent, f->turned, i);
+    double sign = i != root && f->turned[i] ? -1 : 1;
+    for (unsigned c = 0; c < n; c++) normals[i * n + c] = sign * g->plane[i * n + c];
+    if (f->piece[root] == SIZE_MAX) f->piece[root] = pieces++; /* a root may come after its points */
+    f->piece[i] = f->piece[root];
+  }
+  return pieces;
 }
 
 typedef struct box {
@@ -110,20 +149,17 @@ static void find_boxes(const batten_orient_graph *g, size_t pieces, const size_t
   }
 }
 
-/* Winding number about x of the part that point j stands for, a disk (line) that reaches half way to its neighbours.
- */
+/* Winding number about x of what point j stands for. */
 static double winding(const batten_orient_graph *g, const double *normals, size_t j, const double *x) {
-  unsigned n = g->n;
-  double radius = g->distance[j * g->k + g->k - 1], share = 1 / (double)(g->k + 1), square = 0, flux = 0;
-  for (unsigned c = 0; c < n; c++) {
-    double d = g->points[j * n + c] - x[c];
+  const double full = g->n == 2 ? 6.283185307179586 : 12.566370614359172;
+  double square = 0, flux = 0;
+  for (unsigned c = 0; c < g->n; c++) {
+    double d = g->points[j * g->n + c] - x[c];
     square += d * d;
-    flux += d * normals[j * n + c];
+    flux += d * normals[j * g->n + c];
   }
   if (square == 0) return 0;
-  const double pi = 3.141592653589793;
-  return n == 2 ? flux * 2 * radius * share / (2 * pi * square)
-                : flux * pi * radius * radius * share / (4 * pi * square * sqrt(square));
+  return flux * batten_orient_area(g, j) / (full * (g->n == 2 ? square : square * sqrt(square)));
 }
 
 /* Number of other components around component p. order: points sorted by component, start [pieces + 1]. */
@@ -149,13 +185,12 @@ static void turn(const batten_orient_graph *g, size_t begin, size_t end, const s
 }
 
 /* Step 3. */
-static batten_status settle_components(batten_context *ctx, const batten_orient_graph *g, double *normals) {
+static batten_status settle_components(batten_context *ctx, const batten_orient_graph *g, size_t pieces,
+                                       const size_t *piece, double *normals) {
   batten_status status = BATTEN_E_NOMEM;
-  size_t *piece = NULL, *order = NULL, *start = NULL;
+  size_t *order = NULL, *start = NULL;
   unsigned char *inside = NULL;
   box *boxes = NULL;
-  if (!(piece = batten_alloc_array(ctx, g->count, sizeof *piece))) goto done;
-  size_t pieces = batten_orient_pieces(g, normals, -2, piece);
   if (!(order = batten_alloc_array(ctx, g->count, sizeof *order)) ||
       !(start = batten_alloc_array(ctx, pieces + 1, sizeof *start)) ||
       !(inside = batten_alloc_array(ctx, pieces, sizeof *inside)) ||
@@ -184,28 +219,31 @@ done:
   batten_free(ctx, inside);
   batten_free(ctx, start);
   batten_free(ctx, order);
-  batten_free(ctx, piece);
   return status;
 }
 
 batten_status batten_orient_planes(batten_context *ctx, const batten_orient_graph *g, double *normals) {
-  size_t pairs = g->count * g->k; /* the graph holds so many */
+  size_t pairs = g->count * g->k, count = 0; /* the graph holds so many */
   batten_status status = BATTEN_E_NOMEM;
-  tie *ties = batten_alloc_array(ctx, pairs, sizeof *ties), *spare = batten_alloc_array(ctx, pairs, sizeof *spare);
-  size_t *parent = batten_alloc_array(ctx, g->count, sizeof *parent);
-  unsigned char *turned = batten_alloc(ctx, g->count), *rank = batten_alloc(ctx, g->count);
-  if (!ties || !spare || !parent || !turned || !rank) goto done;
-  size_t count = 0;
+  tie *spare = NULL, *ties = batten_alloc_array(ctx, pairs, sizeof *ties);
+  forest f = {0};
+  if (!ties || !(spare = batten_alloc_array(ctx, pairs, sizeof *spare)) ||
+      !(f.parent = batten_alloc_array(ctx, g->count, sizeof *f.parent)) ||
+      !(f.piece = batten_alloc_array(ctx, g->count, sizeof *f.piece)) || !(f.turned = batten_alloc(ctx, g->count)) ||
+      !(f.rank = batten_alloc(ctx, g->count)) || !(f.areas = batten_alloc_array(ctx, g->count, sizeof *f.areas)))
+    goto done;
   for (size_t i = 0; i < g->count; i++)
     for (size_t q = 0; q < g->k; q++) ties[count++] = (tie){tie_weight(g, i, g->index[i * g->k + q]), i * g->k + q};
   sort_ties(count, ties, spare);
   if ((status = batten_progress(ctx, "orient", 0.5)) < 0) goto done;
-  propagate(g, count, ties, parent, turned, rank, normals);
-  status = settle_components(ctx, g, normals);
+  size_t pieces = propagate(g, count, ties, &f, normals);
+  status = settle_components(ctx, g, pieces, f.piece, normals);
 done:
-  batten_free(ctx, rank);
-  batten_free(ctx, turned);
-  batten_free(ctx, parent);
+  batten_free(ctx, f.areas);
+  batten_free(ctx, f.rank);
+  batten_free(ctx, f.turned);
+  batten_free(ctx, f.piece);
+  batten_free(ctx, f.parent);
   batten_free(ctx, spare);
   batten_free(ctx, ties);
   return status;

@@ -60,6 +60,11 @@ static void test_energy(batten_context *ctx) {
   s_sphere(&s, 100, far, 0.2, 1);
   s_orient(ctx, &s, automatic, 1000, energy, 100, 100);
   s_free(&s);
+  s = s_new("ball, noise of half its spacing", 3);
+  s_sphere(&s, 400, zero, 1, 1);
+  s_noise(&s, 0.15, 9);
+  s_orient(ctx, &s, automatic, 1000, energy, 99, 50);
+  s_free(&s);
   s = s_new("three small balls", 3);
   s_sphere(&s, 50, zero, 0.05, 1);
   s_sphere(&s, 50, right, 0.05, 1);
@@ -97,6 +102,11 @@ static void test_planes(batten_context *ctx) {
   s = s_new("plate, sides 5 spacings apart", 3);
   s_plate(&s, 20, 5, 0.3, 5);
   s_orient(ctx, &s, planes, 0, planes, 100, 80);
+  s_free(&s);
+  s = s_new("linked tori", 3); /* one pair of neighbours joins them */
+  s_torus(&s, 400, (double[3]){0}, 1, 0.3, 2, 1);
+  s_torus(&s, 400, (double[3]){1, 0, 0}, 1, 0.3, 1, 2);
+  s_orient(ctx, &s, planes, 0, planes, 100, 98);
   s_free(&s);
   s = s_new("shell, three balls in it", 3);
   s_sphere(&s, 2000, (double[3]){0}, 1, 1);
