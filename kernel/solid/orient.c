@@ -51,6 +51,21 @@ static batten_status to_unit_size(batten_context *ctx, unsigned n, size_t count,
   return BATTEN_OK;
 }
 
+/* lambda of the unit size as smoothing of batten_spline_options: for the box of longest side 1. The kernel is cubic.
+ */
+static double lambda_in_box(unsigned n, size_t count, const double *unit, double lambda) {
+  double side = 0;
+  for (unsigned c = 0; c < n; c++) {
+    double lower = INFINITY, upper = -INFINITY;
+    for (size_t i = 0; i < count; i++) {
+      lower = fmin(lower, unit[i * n + c]);
+      upper = fmax(upper, unit[i * n + c]);
+    }
+    side = fmax(side, upper - lower);
+  }
+  return lambda / (side * side * side);
+}
+
 static batten_status check(batten_context *ctx, unsigned n, size_t count, const double *points,
                            batten_orient_method method, size_t energy_points, const double *normals) {
   if (n < 2 || n > 3) return batten_fail(ctx, BATTEN_E_INVALID, "n: %u; normals are estimated for n = 2 or 3", n);
@@ -199,7 +214,7 @@ batten_status batten_orient(batten_context *ctx, unsigned n, size_t count, const
   }
   memcpy(normals, used == BATTEN_ORIENT_METHOD_ENERGY ? energy : planes, count * n * sizeof *normals);
   if (method_used) *method_used = used;
-  if (lambda_used) *lambda_used = used == BATTEN_ORIENT_METHOD_ENERGY ? lambda : 0;
+  if (lambda_used) *lambda_used = used == BATTEN_ORIENT_METHOD_ENERGY ? lambda_in_box(n, count, unit, lambda) : 0;
 done:
   batten_orient_graph_free(ctx, &graph);
   batten_free(ctx, energy);

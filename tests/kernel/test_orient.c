@@ -292,6 +292,18 @@ static void test_failures(void) {
   }
 }
 
+/* The reported lambda is that of the box of longest side 1; the walk takes tens of the unit size. An ellipse with
+ * axes 2 and 1, evenly in its parameter, has the root mean square radius sqrt(5/2). */
+static void test_lambda(batten_context *ctx) {
+  double normals[80], lambda = 0;
+  scene s = s_new("ellipse", 2);
+  s_ellipse(&s, 40, 0, 0, 2, 1, 1);
+  T_OK(batten_orient(ctx, 2, 40, s.points, energy, 1000, normals, NULL, &lambda), ctx);
+  double side = 4 * cos(s_pi / 40), unit = 2 * sqrt(2.5), box = lambda * pow(side / unit, 3);
+  T_RATIO(fabs(box - 1e-3), 1e-15, "lambda of the box %.6g is 1e-3 of the unit size", lambda);
+  s_free(&s);
+}
+
 static void test_bad_input(batten_context *ctx) {
   double x[15] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 1, 1}, line[8] = {0, 0, 1, 2, 2, 4, 5, 10};
   double flat[15] = {0, 0, 7, 1, 0, 7, 0, 1, 7, 1, 1, 7, 2, 1, 7}, equal[15] = {0}, v[15];
@@ -325,6 +337,7 @@ int main(void) {
   test_subset(ctx);
   test_invariance(ctx, planes);
   test_invariance(ctx, energy);
+  test_lambda(ctx);
   test_failures();
   test_bad_input(ctx);
   T_CHECK(batten_bytes_in_use(ctx) == 0, "nothing is left behind");

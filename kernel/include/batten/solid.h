@@ -136,8 +136,25 @@ BATTEN_API const double *batten_solid_points(const batten_solid *s, size_t *coun
 BATTEN_API batten_solid *batten_solid_retain(batten_solid *s);
 BATTEN_API void batten_solid_free(batten_solid *s);
 
-/* Normals of unoriented surface points, [count][n] outward unit vectors. method_used, lambda_used may be NULL.
- * n = 2 or 3. Fails: INVALID, NOMEM, TOO_LARGE, SINGULAR, CANCELLED. */
+/* Normals of unoriented surface points: normals [count][n], outward unit vectors, n = 2 or 3, count >= n + 2.
+ *
+ *   ENERGY  the unit gradients of the spline (kernel r^3, linear part) of least energy that is 0 at the points
+ *           [Huang, Carr, Ju 2019]. Values are smoothed: the spline minimises |f|^2 + sum f(x_i)^2 / lambda. lambda
+ *           walks down by tens from 1e-2 (points scaled to twice their root mean square distance from the centroid)
+ *           until the signs stay put. Above energy_points a well-spread subset is oriented so; the gradient of its f
+ *           gives the others their sign, and their direction where local planes are unsure. Walls thinner than about
+ *           half of the subset's spacing are lost. About 8 ((n + 1) E)^2 bytes, and 20 E^3 flops for each of 2 to 5
+ *           lambdas, for E points.
+ *   PLANES  planes through nearest neighbours, signs along a spanning forest: for dense, even samples. O(N log N).
+ *   AUTO    ENERGY; PLANES when energy's normals are rougher between neighbours plus less closed as a surface
+ *           (|sum of area normal| / area) by more than 0.1, or when its matrix is singular.
+ *
+ * Outward: extreme points look away from the rest. energy_points: more than n + 1, batten_solid_options takes 1000;
+ * PLANES does not read it. method_used: ENERGY or PLANES. lambda_used: the lambda at which the signs were settled, as
+ * smoothing of batten_spline_options (unit box); 0 with PLANES. Both may be NULL. Points that coincide get the same
+ * normal from ENERGY. The result does not depend on the order of the points, up to ties in distance, nor on the
+ * context's threads; with other threads of BLAS it differs by rounding. Progress phase "orient".
+ * Fails: INVALID, NOMEM, TOO_LARGE, SINGULAR (all on one line or plane), CANCELLED. */
 BATTEN_API batten_status batten_orient(batten_context *ctx, unsigned n, size_t count, const double *points,
                                        batten_orient_method method, size_t energy_points, double *normals,
                                        batten_orient_method *method_used, double *lambda_used);
