@@ -1,6 +1,7 @@
 /* Even triangles on f = 0 (Botsch, Kobbelt 2004, "A remeshing approach to multiresolution modeling"): a round splits
  * long edges, collapses short ones, flips towards Delaunay, and moves vertices towards the mean of their neighbours
- * in the tangent plane, then back to the surface by one Newton step. Field values come in one batch a round.
+ * in the tangent plane, then, every second round, back to the surface by one Newton step: a move along the tangent
+ * plane leaves the surface by its square only, so that the rounds between need no field. Values come in one batch.
  *
  * No step may turn a triangle over: a change is made only when the new triangles face as the old ones did and as the
  * gradients at their corners ask for. Vertices on the box stay on their faces of it, corners on an edge of the box
@@ -46,9 +47,9 @@ static double quality(const double *a, const double *b, const double *c, double 
 }
 
 typedef struct facet {
-  double n[3];    /* unit normal, 0 without area */
+  double n[3]; /* unit normal, 0 without area */
   double quality;
-  double facing;  /* cosine with the sum of the corners' normals */
+  double facing; /* cosine with the sum of the corners' normals */
 } facet;
 
 static facet facet_of(const double *a, const double *b, const double *c, const double *na, const double *nb,
@@ -98,8 +99,8 @@ static bool ring_allows(const improver *im, uint32_t v, uint32_t other, const do
   for (size_t i = 0; i < count; i++) {
     uint32_t p = s->origin[mesh_next(ring[i])], q = s->origin[mesh_previous(ring[i])];
     if (p == other || q == other) continue;
-    if (other != MESH_NONE && (vec_distance(x, point(s, p)) > LONG_EDGE * im->edge ||
-                               vec_distance(x, point(s, q)) > LONG_EDGE * im->edge))
+    if (other != MESH_NONE &&
+        (vec_distance(x, point(s, p)) > LONG_EDGE * im->edge || vec_distance(x, point(s, q)) > LONG_EDGE * im->edge))
       return false;
     facet before = facet_of(point(s, v), point(s, p), point(s, q), normal(s, v), normal(s, p), normal(s, q));
     facet after = facet_of(x, point(s, p), point(s, q), n, normal(s, p), normal(s, q));
@@ -138,6 +139,22 @@ static void collapse_short(improver *im) {
 
 /* ---- flip --------------------------------------------------------------------------------------- */
 
+/* Sine of the sum of the angles at c and d, which see a b: negative when it is above pi. */
+static double opposite_angles(const double *a, const double *b, const double *c, const double *d) {
+  double ca[3], cb[3], da[3], db[3], n[3];
+  vec_sub(a, c, ca);
+  vec_sub(b, c, cb);
+  vec_sub(a, d, da);
+  vec_sub(b, d, db);
+  double dot_c = vec_dot(ca, cb), dot_d = vec_dot(da, db);
+  if (dot_c >= 0 && dot_d >= 0) return 1; /* both at most a right angle */
+  vec_cross(ca, cb, n);
+  double sine_c = vec_norm(n);
+  vec_cross(da, db, n);
+  double sine_d = vec_norm(n);
+  return (sine_c * dot_d + dot_c * sine_d) / (hypot(sine_c, dot_c) * hypot(sine_d, dot_d));
+}
+
 /* An edge is turned when the angles opposite to it add up to more than pi (not Delaunay), the two triangles lie about
  * flat or get flatter by it, and both new ones face outward. */
 static bool wants_flip(const batten_surface *s, uint32_t h) {
@@ -146,8 +163,7 @@ static bool wants_flip(const batten_surface *s, uint32_t h) {
   uint32_t v[4] = {s->origin[h], s->origin[g], s->origin[mesh_previous(h)], s->origin[mesh_previous(g)]};
   const double *a = point(s, v[0]), *b = point(s, v[1]), *c = point(s, v[2]), *d = point(s, v[3]);
   const double *na = normal(s, v[0]), *nb = normal(s, v[1]), *nc = normal(s, v[2]), *nd = normal(s, v[3]);
-  /* A margin, so that four points on a circle do not turn for ever. */
-  if (!(vec_angle(c, a, b) + vec_angle(d, b, a) > 3.1416 + 1e-3)) return false;
+  if (!(opposite_angles(a, b, c, d) < -1e-3)) return false; /* a margin, so that four points on a circle rest */
   facet left = facet_of(a, b, c, na, nb, nc), right = facet_of(b, a, d, nb, na, nd);
   facet first = facet_of(d, c, a, nd, nc, na), second = facet_of(c, d, b, nc, nd, nb);
   double bend = vec_dot(left.n, right.n), bend_after = vec_dot(first.n, second.n);
@@ -178,7 +194,8 @@ static void keep_on_faces(unsigned char faces, double *d) {
     if (batten_on_face(faces, k)) d[k] = 0;
 }
 
-/* Where v should go along the surface: towards the mean of its neighbours; on the box, of its two neighbours there. */
+/* Where v should go along the surface: towards the mean of its neighbours; on the box, of its two neighbours there.
+ */
 static void smooth_target(const improver *im, uint32_t v, double *x) {
   const batten_surface *s = im->s;
   uint32_t around[SURFACE_RING_MAX + 1];
@@ -218,18 +235,19 @@ static batten_status make_room(improver *im) {
   return BATTEN_OK;
 }
 
-/* One pass over all vertices of the compacted surface. */
-static batten_status smooth(improver *im) {
+/* One pass over all vertices of the compacted surface; on_field: back to f = 0 after the move along the surface. */
+static batten_status smooth(improver *im, bool on_field) {
   batten_surface *s = im->s;
   batten_status st = make_room(im);
   if (st < 0) return st;
   for (uint32_t v = 0; v < s->vertex_count; v++) smooth_target(im, v, im->target + 3 * (size_t)v);
-  st = batten_sampler_gradients(im->sampler, s->vertex_count, im->target, im->values, im->gradients);
+  if (on_field) st = batten_sampler_gradients(im->sampler, s->vertex_count, im->target, im->values, im->gradients);
   if (st < 0) return st;
   for (uint32_t v = 0; v < s->vertex_count; v++) {
     double *x = im->target + 3 * (size_t)v, n[3];
     memcpy(n, normal(s, v), sizeof n);
-    batten_newton_step(3, im->values[v], im->gradients + 3 * (size_t)v, s->faces[v], STEP_MAX * im->edge, x, n);
+    if (on_field)
+      batten_newton_step(3, im->values[v], im->gradients + 3 * (size_t)v, s->faces[v], STEP_MAX * im->edge, x, n);
     for (int attempt = 0; attempt < 3; attempt++) { /* all of the way, half, a quarter */
       if (ring_allows(im, v, MESH_NONE, x, n)) {
         memcpy(point(s, v), x, sizeof n);
@@ -252,7 +270,7 @@ batten_status batten_surface_improve(batten_surface *s, batten_sampler *sampler,
     collapse_short(&im);
     flip_sweeps(&im);
     st = batten_surface_compact(s);
-    if (st >= 0) st = smooth(&im);
+    if (st >= 0) st = smooth(&im, round % 2 == 0 || round + 1 == rounds);
     if (st >= 0) flip_sweeps(&im);
   }
   batten_free(s->ctx, im.target);
@@ -267,8 +285,8 @@ batten_status batten_surface_settle(batten_surface *s, batten_sampler *sampler, 
                                     double *distance_max) {
   double *distance = batten_alloc_array(s->ctx, s->vertex_count, sizeof *distance), worst = 0;
   if (!distance) return BATTEN_E_NOMEM;
-  batten_status st = batten_project_points(sampler, s->vertex_count, s->points, s->faces, edge, tolerance, s->normals,
-                                           distance);
+  batten_status st =
+      batten_project_points(sampler, s->vertex_count, s->points, s->faces, edge, tolerance, s->normals, distance);
   for (size_t v = 0; st >= 0 && v < s->vertex_count; v++) worst = fmax(worst, distance[v]);
   if (st >= 0) *distance_max = worst;
   batten_free(s->ctx, distance);

@@ -5,8 +5,8 @@
 #include "sampler.h"
 #include "surface.h"
 
-/* Rounds of split, collapse, flip and tangential smoothing towards edges of the length `edge`; every move is followed
- * by a Newton step on the field. */
+/* Rounds of split, collapse, flip and tangential smoothing towards edges of the length `edge`; every second one ends
+ * with a Newton step on the field. */
 batten_status batten_surface_improve(batten_surface *s, batten_sampler *sampler, double edge, unsigned rounds);
 
 /* Puts every vertex on f = 0 to |f| / |grad f| <= tolerance; *distance_max: what is left. Vertices move at most by

@@ -33,7 +33,8 @@ typedef const double *corners[3];
 
 static bool same_place(const double *a, const double *b) { return a[0] == b[0] && a[1] == b[1] && a[2] == b[2]; }
 
-/* Picks the coordinate plane (x, y) in which the triangle keeps its area and returns its turn there; 0: it has none. */
+/* Picks the coordinate plane (x, y) in which the triangle keeps its area and returns its turn there; 0: it has none.
+ */
 static int projection(const double *a, const double *b, const double *c, int *x, int *y) {
   for (int k = 0; k < 3; k++) {
     *x = (k + 1) % 3;
@@ -204,8 +205,10 @@ static void split_at_median(const box_tree *tree, uint32_t *order, uint32_t coun
       order[i++] = order[j];
       order[j--] = t;
     }
-    if (j >= wanted) high = j;
-    else low = j + 1;
+    if (j >= wanted)
+      high = j;
+    else
+      low = j + 1;
   }
 }
 
@@ -338,7 +341,8 @@ done:
 batten_status batten_mesh_self_intersections(batten_context *ctx, const batten_mesh *mesh, size_t *pairs) {
   if (!ctx) return BATTEN_E_INVALID;
   if (!mesh || !pairs)
-    return batten_fail(ctx, BATTEN_E_INVALID, "%s: NULL; give a mesh and room for the count", mesh ? "pairs" : "mesh");
+    return batten_fail(ctx, BATTEN_E_INVALID, "%s: NULL; give a mesh and room for the count",
+                       mesh ? "pairs" : "mesh");
   return batten_mesh_find_crossings(ctx, mesh->vertex_count, mesh->vertices, mesh->triangle_count, mesh->triangles,
                                     NULL, pairs);
 }

@@ -162,7 +162,8 @@ static void set_topology(const batten_mesh_topology *t, size_t triangles, batten
 batten_status batten_mesh_measure(batten_context *ctx, const batten_mesh *mesh, batten_mesh_measures *out) {
   if (!ctx) return BATTEN_E_INVALID;
   if (!mesh || !out)
-    return batten_fail(ctx, BATTEN_E_INVALID, "%s: NULL; give a mesh and room for its measures", mesh ? "out" : "mesh");
+    return batten_fail(ctx, BATTEN_E_INVALID, "%s: NULL; give a mesh and room for its measures",
+                       mesh ? "out" : "mesh");
   batten_mesh_measures m = {0};
   batten_mesh_topology topology;
   sums s = {.angle_min = INFINITY, .edge_min = INFINITY};

@@ -87,20 +87,20 @@ batten_status batten_mesh_set_field(batten_context *ctx, batten_mesh *mesh, cons
   char *copy = (char *)(block + count);
   memcpy(copy, name, length);
 
-  mesh_field *field = mesh->fields, *end = mesh->fields + mesh->field_count;
-  while (field < end && strcmp(field->name, name) != 0) field++;
-  if (field == end) {
+  size_t at = 0;
+  while (at < mesh->field_count && strcmp(mesh->fields[at].name, name) != 0) at++;
+  if (at == mesh->field_count) {
     mesh_field *grown = batten_realloc_array(mesh->ctx, mesh->fields, mesh->field_count + 1, sizeof *grown);
     if (!grown) {
       batten_free(mesh->ctx, block);
       return BATTEN_E_NOMEM;
     }
     mesh->fields = grown;
-    field = grown + mesh->field_count++;
+    mesh->field_count++;
   } else {
-    batten_free(mesh->ctx, field->values);
+    batten_free(mesh->ctx, mesh->fields[at].values);
   }
-  *field = (mesh_field){components, block, copy};
+  mesh->fields[at] = (mesh_field){components, block, copy};
   return BATTEN_OK;
 }
 

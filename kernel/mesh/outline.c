@@ -16,9 +16,9 @@
 enum {
   COORDINATE_BITS = 30,
   SQUARES_MAX = 1 << (COORDINATE_BITS - 2),
-  SEED_REACH = 2,    /* squares around a seed in which the outline is looked for */
-  DIVISIONS = 4,     /* times that a chain is divided anew */
-  LOOP_LEAST = 8,    /* vertices of the smallest loop */
+  SEED_REACH = 2, /* squares around a seed in which the outline is looked for */
+  DIVISIONS = 4,  /* times that a chain is divided anew */
+  LOOP_LEAST = 8, /* vertices of the smallest loop */
   CHAIN_LEAST = 2,
 };
 
@@ -54,7 +54,9 @@ typedef struct walker {
 
 /* ---- the lattice -------------------------------------------------------------------------------- */
 
-static uint64_t pack(const int32_t *c) { return (uint64_t)(uint32_t)c[0] << COORDINATE_BITS | (uint64_t)(uint32_t)c[1]; }
+static uint64_t pack(const int32_t *c) {
+  return (uint64_t)(uint32_t)c[0] << COORDINATE_BITS | (uint64_t)(uint32_t)c[1];
+}
 
 static void unpack(uint64_t key, int32_t *c) {
   c[0] = (int32_t)(key >> COORDINATE_BITS);
@@ -122,7 +124,8 @@ static batten_status add_nodes(walker *w, uint64_t number) {
                          w->node_count);
     if (!batten_table_insert(w->ctx, &w->nodes, keys[i], (uint32_t)w->node_count, &is_new)) return BATTEN_E_NOMEM;
     if (!is_new) continue;
-    if (batten_reserve(w->ctx, (void **)&w->node_keys, &w->node_capacity, w->node_count + 1, sizeof *w->node_keys) < 0)
+    if (batten_reserve(w->ctx, (void **)&w->node_keys, &w->node_capacity, w->node_count + 1, sizeof *w->node_keys) <
+        0)
       return BATTEN_E_NOMEM;
     w->node_keys[w->node_count++] = keys[i];
   }
@@ -161,7 +164,8 @@ static batten_status cross_one(walker *w, uint64_t number) {
   int count = look_up(w, number, node, inside);
   if (count == 0 || count == 3) return BATTEN_OK;
   *batten_table_find(&w->triangles, number) = 1;
-  if (batten_reserve(w->ctx, (void **)&w->crossed, &w->crossed_capacity, w->crossed_count + 1, sizeof *w->crossed) < 0)
+  if (batten_reserve(w->ctx, (void **)&w->crossed, &w->crossed_capacity, w->crossed_count + 1, sizeof *w->crossed) <
+      0)
     return BATTEN_E_NOMEM;
   w->crossed[w->crossed_count++] = number;
   for (int i = 0; i < 3; i++) {
@@ -309,7 +313,8 @@ static batten_status extract(walker *w) {
 
 static double distance2(const double *a, const double *b) { return hypot(b[0] - a[0], b[1] - a[1]); }
 
-/* Writes the chain that starts at vertex v to path (a closed one with its first vertex again at the end): how many. */
+/* Writes the chain that starts at vertex v to path (a closed one with its first vertex again at the end): how many.
+ */
 static size_t follow(const walker *w, uint32_t v, unsigned char *seen, double *path, unsigned char *faces) {
   size_t count = 0;
   uint32_t start = v;
@@ -345,25 +350,27 @@ static void divide(size_t count, const double *path, size_t pieces, double *out)
       i++;
     }
     double t = step > 0 ? fmin(1, (wanted - gone) / step) : 0;
-    for (size_t k = 0; k < 2; k++) out[2 * j + k] = path[2 * (i - 1) + k] + t * (path[2 * i + k] - path[2 * (i - 1) + k]);
+    for (size_t k = 0; k < 2; k++)
+      out[2 * j + k] = path[2 * (i - 1) + k] + t * (path[2 * i + k] - path[2 * (i - 1) + k]);
   }
   memcpy(out + 2 * pieces, path + 2 * (count - 1), 2 * sizeof *out);
 }
 
 typedef struct chain_list {
-  size_t loops, vertices;                 /* so far */
-  size_t *first;                          /* [loops + 1] */
-  unsigned char *closed;                  /* [loops] */
-  double *path, *other, *distance;        /* [room] one chain */
+  size_t loops, vertices;          /* so far */
+  size_t *first;                   /* [loops + 1] */
+  unsigned char *closed;           /* [loops] */
+  double *path, *other, *distance; /* [room] one chain */
   unsigned char *faces;
   size_t room;
   double distance_max;
-  double *points;                         /* [vertices][2] */
+  double *points; /* [vertices][2] */
   size_t first_capacity, closed_capacity, points_capacity;
 } chain_list;
 
 static batten_status keep_chain(walker *w, chain_list *c, size_t own, bool closed) {
-  if (batten_reserve(w->ctx, (void **)&c->points, &c->points_capacity, c->vertices + own, 2 * sizeof *c->points) < 0 ||
+  if (batten_reserve(w->ctx, (void **)&c->points, &c->points_capacity, c->vertices + own, 2 * sizeof *c->points) <
+          0 ||
       batten_reserve(w->ctx, (void **)&c->first, &c->first_capacity, c->loops + 2, sizeof *c->first) < 0 ||
       batten_reserve(w->ctx, (void **)&c->closed, &c->closed_capacity, c->loops + 1, 1) < 0)
     return BATTEN_E_NOMEM;
@@ -376,7 +383,8 @@ static batten_status keep_chain(walker *w, chain_list *c, size_t own, bool close
 }
 
 /* Divides the chain in path and puts it on f = 0, DIVISIONS times over. */
-static batten_status settle_chain(walker *w, chain_list *c, size_t count, bool closed, double cell, double tolerance) {
+static batten_status settle_chain(walker *w, chain_list *c, size_t count, bool closed, double cell,
+                                  double tolerance) {
   unsigned char ends[2] = {c->faces[0], c->faces[count - 1]};
   size_t own = 0;
   batten_status st = BATTEN_OK;
@@ -446,10 +454,11 @@ static batten_status walk(walker *w, size_t seed_count, const double *seeds, siz
   batten_free(w->ctx, missed);
   if (st < 0) return st;
   if (w->crossed_count == 0)
-    return batten_fail(w->ctx, BATTEN_E_NOT_FOUND,
-                       "seeds: the field does not change its sign within %d cells of any of the %zu seeds; give points "
-                       "on the outline, or another opt.cell",
-                       SEED_REACH, seed_count);
+    return batten_fail(
+        w->ctx, BATTEN_E_NOT_FOUND,
+        "seeds: the field does not change its sign within %d cells of any of the %zu seeds; give points "
+        "on the outline, or another opt.cell",
+        SEED_REACH, seed_count);
   return extract(w);
 }
 
@@ -492,8 +501,8 @@ batten_status batten_trace_outline(batten_context *ctx, const batten_field *fiel
   batten_status st = batten_polygonize_frame(ctx, 2, field, seed_count, seeds, &o, out, &frame);
   if (st < 0) return st;
   batten_polygonize_info found = {.cell = frame.cell};
-  batten_sampler sampler = {.ctx = ctx, .field = field, .evaluations_max = o.evaluations_max,
-                            .difference = BATTEN_DIFFERENCE * frame.cell};
+  batten_sampler sampler = {
+      .ctx = ctx, .field = field, .evaluations_max = o.evaluations_max, .difference = BATTEN_DIFFERENCE * frame.cell};
   walker w = {.sampler = &sampler, .ctx = ctx};
   chain_list chains = {.loops = 0};
   batten_outline *outline = NULL;
@@ -507,8 +516,12 @@ batten_status batten_trace_outline(batten_context *ctx, const batten_field *fiel
   st = BATTEN_E_NOMEM;
   outline = batten_alloc(ctx, sizeof *outline);
   if (!outline) goto done;
-  *outline = (batten_outline){.ctx = ctx, .loop_count = chains.loops, .vertex_count = chains.vertices,
-                              .first = chains.first, .closed = chains.closed, .vertices = chains.points};
+  *outline = (batten_outline){.ctx = ctx,
+                              .loop_count = chains.loops,
+                              .vertex_count = chains.vertices,
+                              .first = chains.first,
+                              .closed = chains.closed,
+                              .vertices = chains.points};
   chains.first = NULL;
   chains.closed = NULL;
   chains.points = NULL;

@@ -10,8 +10,8 @@
 
 #include <string.h>
 
-static const double BOX_MARGIN = 0.25;                      /* of the seeds' largest extent, on every side */
-static const double CELL_SPACING = 0.7;                     /* of the median distance between neighbouring seeds */
+static const double BOX_MARGIN = 0.25;  /* of the seeds' largest extent, on every side */
+static const double CELL_SPACING = 0.7; /* of the median distance between neighbouring seeds */
 static const double CELL_LARGEST = 1.0 / 30, CELL_SMALLEST = 1.0 / 200; /* of the diagonal of the seeds' box */
 static const double CUBE_EDGES = 1.25; /* lattice cubes are wider than the edges: they give 3.6 vertices for each */
 
@@ -27,7 +27,8 @@ static batten_status check_options(batten_context *ctx, unsigned n, const batten
       batten_check_struct(ctx, "batten_polygonize_options", o->struct_size, sizeof(batten_polygonize_options));
   if (st < 0) return st;
   if (!(o->cell >= 0) || isinf(o->cell))
-    return batten_fail(ctx, BATTEN_E_INVALID, "opt.cell: %g; give a length > 0, or 0 for one from the seeds", o->cell);
+    return batten_fail(ctx, BATTEN_E_INVALID, "opt.cell: %g; give a length > 0, or 0 for one from the seeds",
+                       o->cell);
   if (!(o->accuracy > 0) || !(o->accuracy < 1))
     return batten_fail(ctx, BATTEN_E_INVALID, "opt.accuracy: %g; give a share of the box diagonal, 0 < accuracy < 1",
                        o->accuracy);
@@ -36,8 +37,8 @@ static batten_status check_options(batten_context *ctx, unsigned n, const batten
   for (unsigned k = 0; given && k < n; k++)
     if (!(o->lower[k] < o->upper[k]) || isinf(o->lower[k]) || isinf(o->upper[k]) || isinf(o->upper[k] - o->lower[k]))
       return batten_fail(ctx, BATTEN_E_INVALID,
-                         "opt.lower[%u], opt.upper[%u]: %g, %g; give lower < upper, or all 0 for the seeds' box", k, k,
-                         o->lower[k], o->upper[k]);
+                         "opt.lower[%u], opt.upper[%u]: %g, %g; give lower < upper, or all 0 for the seeds' box", k,
+                         k, o->lower[k], o->upper[k]);
   return BATTEN_OK;
 }
 
@@ -79,14 +80,17 @@ static double select_value(size_t count, double *v, size_t wanted) {
       v[i++] = v[j];
       v[j--] = t;
     }
-    if (j >= wanted) high = j;
-    else low = j + 1;
+    if (j >= wanted)
+      high = j;
+    else
+      low = j + 1;
   }
   return v[wanted];
 }
 
 /* Median distance of a seed to the nearest other one, those at the same place left out; 0 when there is none. */
-static batten_status seed_spacing(batten_context *ctx, unsigned n, size_t count, const double *seeds, double *spacing) {
+static batten_status seed_spacing(batten_context *ctx, unsigned n, size_t count, const double *seeds,
+                                  double *spacing) {
   *spacing = 0;
   if (count < 2) return BATTEN_OK;
   size_t *index = batten_alloc_array(ctx, count, sizeof *index);
@@ -133,8 +137,8 @@ batten_status batten_polygonize_frame(batten_context *ctx, unsigned n, const bat
     f.upper[k] = given ? opt->upper[k] : upper[k] + BOX_MARGIN * extent;
     if (!(f.lower[k] < f.upper[k]) || isinf(f.upper[k] - f.lower[k]))
       return batten_fail(ctx, BATTEN_E_INVALID,
-                         "seeds: their box is [%g, %g] along axis %u; give opt.lower and opt.upper", lower[k], upper[k],
-                         k);
+                         "seeds: their box is [%g, %g] along axis %u; give opt.lower and opt.upper", lower[k],
+                         upper[k], k);
   }
   f.diagonal = diagonal(n, f.lower, f.upper);
   if (f.cell == 0) {
@@ -162,7 +166,8 @@ batten_status batten_polygonize_warn(batten_context *ctx, const batten_polygoniz
                        "opt.improve larger than 0",
                        info->self_intersections, info->cell);
   if (info->clipped)
-    return batten_fail(ctx, BATTEN_W_CLIPPED, "the surface reaches its box and is cut there; enlarge opt.lower and "
+    return batten_fail(ctx, BATTEN_W_CLIPPED,
+                       "the surface reaches its box and is cut there; enlarge opt.lower and "
                        "opt.upper for all of it");
   return BATTEN_OK;
 }
@@ -183,7 +188,8 @@ static batten_status attempt(batten_sampler *sampler, const batten_frame *frame,
   for (size_t v = 0; v < rough.vertex_count; v++) info->clipped = info->clipped || rough.faces[v];
   st = batten_surface_build(sampler->ctx, &rough, surface);
   if (st >= 0) st = batten_surface_improve(surface, sampler, edge, opt->improve);
-  if (st >= 0) st = batten_surface_settle(surface, sampler, edge, opt->accuracy * frame->diagonal, &info->distance_max);
+  if (st >= 0)
+    st = batten_surface_settle(surface, sampler, edge, opt->accuracy * frame->diagonal, &info->distance_max);
   if (st >= 0)
     st = batten_mesh_find_crossings(sampler->ctx, surface->vertex_count, surface->points, surface->triangle_count,
                                     surface->origin, NULL, &info->self_intersections);
@@ -207,8 +213,8 @@ static batten_status make_surface(batten_sampler *sampler, const batten_frame *f
   return st;
 }
 
-batten_status batten_polygonize(batten_context *ctx, const batten_field *field, size_t seed_count, const double *seeds,
-                                const batten_polygonize_options *opt, batten_mesh **out,
+batten_status batten_polygonize(batten_context *ctx, const batten_field *field, size_t seed_count,
+                                const double *seeds, const batten_polygonize_options *opt, batten_mesh **out,
                                 batten_polygonize_info *info) {
   if (!ctx) return BATTEN_E_INVALID;
   batten_polygonize_options o = opt ? *opt : batten_polygonize_options_default();
@@ -217,8 +223,8 @@ batten_status batten_polygonize(batten_context *ctx, const batten_field *field, 
   if (st < 0) return st;
   batten_polygonize_info found = {.cell = frame.cell};
   batten_surface surface = {.ctx = ctx};
-  batten_sampler sampler = {.ctx = ctx, .field = field, .evaluations_max = o.evaluations_max,
-                            .difference = BATTEN_DIFFERENCE * frame.cell};
+  batten_sampler sampler = {
+      .ctx = ctx, .field = field, .evaluations_max = o.evaluations_max, .difference = BATTEN_DIFFERENCE * frame.cell};
   st = make_surface(&sampler, &frame, seed_count, seeds, &o, &surface, &found);
   found.evaluations = sampler.evaluations;
   if (st >= 0)

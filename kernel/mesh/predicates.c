@@ -82,7 +82,8 @@ int batten_orient2d(const double *a, const double *b, const double *c, int x, in
   if (det > bound) return 1;
   if (det < -bound) return -1;
   double h[MINOR];
-  size_t n = minor2(difference(b[x], a[x]), difference(c[y], a[y]), difference(b[y], a[y]), difference(c[x], a[x]), h);
+  size_t n =
+      minor2(difference(b[x], a[x]), difference(c[y], a[y]), difference(b[y], a[y]), difference(c[x], a[x]), h);
   return sign_of(n, h);
 }
 

@@ -5,7 +5,8 @@
 /* Sign of det [b - a, c - a] in the plane of the coordinates x and y (0 .. 2): +1 when a b c turn left. */
 int batten_orient2d(const double *a, const double *b, const double *c, int x, int y);
 
-/* Sign of det [b - a, c - a, d - a]: +1 when d lies on the side of a b c from which they are seen counter-clockwise. */
+/* Sign of det [b - a, c - a, d - a]: +1 when d lies on the side of a b c from which they are seen counter-clockwise.
+ */
 int batten_orient3d(const double *a, const double *b, const double *c, const double *d);
 
 #endif

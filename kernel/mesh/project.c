@@ -6,9 +6,9 @@
 #include <string.h>
 
 enum {
-  NEWTON_ROUNDS = 6,  /* a smooth field needs one to three */
+  NEWTON_ROUNDS = 6,   /* a smooth field needs one to three */
   BISECTIONS_MAX = 60, /* enough for any tolerance in doubles */
-  BRACKETS = 5,       /* distances looked at on each side: reach, reach / 2, ... */
+  BRACKETS = 5,        /* distances looked at on each side: reach, reach / 2, ... */
 };
 
 /* Length of a, without over- or underflow; a becomes a unit vector (or stays 0). */
@@ -43,13 +43,13 @@ double batten_newton_step(unsigned n, double f, const double *gradient, unsigned
 
 typedef struct work {
   unsigned n;
-  size_t active;      /* points that are not settled, list[0 .. active) */
-  size_t *list;       /* [count] */
-  double *home;       /* [count][n] where they came from */
-  double *x;          /* [room][n] what is evaluated */
-  double *values;     /* [room] */
-  double *gradients;  /* [count][n] last known */
-  double *batch;      /* [count][n] gradients of a batch */
+  size_t active;     /* points that are not settled, list[0 .. active) */
+  size_t *list;      /* [count] */
+  double *home;      /* [count][n] where they came from */
+  double *x;         /* [room][n] what is evaluated */
+  double *values;    /* [room] */
+  double *gradients; /* [count][n] last known */
+  double *batch;     /* [count][n] gradients of a batch */
 } work;
 
 /* Along the unit vector d from home by t, without leaving the faces. */
@@ -152,8 +152,10 @@ static batten_status bisect(batten_sampler *s, work *w, double *x, const unsigne
     for (size_t j = 0, m = 0; st >= 0 && j < w->active; j++) {
       if (!(fabs(to[j] - from[j]) > tolerance)) continue;
       double middle = 0.5 * from[j] + 0.5 * to[j];
-      if (w->values[m++] >= 0) from[j] = middle;
-      else to[j] = middle;
+      if (w->values[m++] >= 0)
+        from[j] = middle;
+      else
+        to[j] = middle;
     }
   }
   for (size_t j = 0; st >= 0 && j < w->active; j++) {

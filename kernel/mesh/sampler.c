@@ -23,8 +23,10 @@ static batten_status evaluate(batten_sampler *s, size_t count, const double *poi
   if (bad == count) return BATTEN_OK;
   char place[128];
   const double *p = points + n * bad;
-  if (n == 2) snprintf(place, sizeof place, "(%.17g, %.17g)", p[0], p[1]);
-  else snprintf(place, sizeof place, "(%.17g, %.17g, %.17g)", p[0], p[1], p[2]);
+  if (n == 2)
+    snprintf(place, sizeof place, "(%.17g, %.17g)", p[0], p[1]);
+  else
+    snprintf(place, sizeof place, "(%.17g, %.17g, %.17g)", p[0], p[1], p[2]);
   return batten_fail(s->ctx, BATTEN_E_INVALID,
                      "field: %g at the point %s; the field must be finite within the box and a cell around it",
                      values[bad], place);

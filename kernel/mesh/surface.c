@@ -129,7 +129,8 @@ static batten_status make_room(batten_surface *s) {
   size_t v = s->vertex_count + 1, h = 3 * s->triangle_count + 6;
   batten_context *ctx = s->ctx;
   if (v >= UINT32_MAX || h >= UINT32_MAX)
-    return batten_fail(ctx, BATTEN_E_TOO_LARGE, "opt.cell: %zu triangles are too many; enlarge it", s->triangle_count);
+    return batten_fail(ctx, BATTEN_E_TOO_LARGE, "opt.cell: %zu triangles are too many; enlarge it",
+                       s->triangle_count);
   if (batten_reserve(ctx, (void **)&s->points, &s->points_capacity, v, 3 * sizeof *s->points) < 0 ||
       batten_reserve(ctx, (void **)&s->normals, &s->normals_capacity, v, 3 * sizeof *s->normals) < 0 ||
       batten_reserve(ctx, (void **)&s->faces, &s->faces_capacity, v, 1) < 0 ||

@@ -111,8 +111,10 @@ static void join_loops(const uint32_t *triangles, size_t half_edges, scratch *s)
     uint32_t ends[2] = {h, mesh_next(h)};
     for (int e = 0; e < 2; e++) {
       uint32_t fan = find(s->corner, ends[e]);
-      if (s->fan_entry[fan] == MESH_NONE) s->fan_entry[fan] = h;
-      else join(s->loop, s->fan_entry[fan], h);
+      if (s->fan_entry[fan] == MESH_NONE)
+        s->fan_entry[fan] = h;
+      else
+        join(s->loop, s->fan_entry[fan], h);
     }
   }
   (void)triangles;

@@ -213,8 +213,7 @@ static batten_status run_fronts(tracker *tr) {
   while (tr->next_count > 0) {
     batten_status st = take_front(tr);
     if (st >= 0) st = evaluate_new_nodes(tr);
-    for (size_t i = 0; st >= 0 && i < tr->front_count; i++)
-      st = cross_one(tr, tr->front[i], tr->front_nodes + 4 * i);
+    for (size_t i = 0; st >= 0 && i < tr->front_count; i++) st = cross_one(tr, tr->front[i], tr->front_nodes + 4 * i);
     if (st < 0) return st;
     /* How large the surface is nobody knows beforehand: the front's share of what is found says how much is left. */
     double found = (double)tr->crossed_count, left = (double)tr->next_count;
@@ -256,7 +255,8 @@ static int visit_around(tracker *tr, const int32_t *cube, int32_t reach, int (*v
   for (int32_t i = 0; i < side * side * side; i++) {
     int32_t c[3] = {cube[0] + 2 * (i % side - reach), cube[1] + 2 * (i / side % side - reach),
                     cube[2] + 2 * (i / (side * side) - reach)};
-    if (c[0] < 0 || c[1] < 0 || c[2] < 0 || c[0] > tr->limit[0] || c[1] > tr->limit[1] || c[2] > tr->limit[2]) continue;
+    if (c[0] < 0 || c[1] < 0 || c[2] < 0 || c[0] > tr->limit[0] || c[1] > tr->limit[1] || c[2] > tr->limit[2])
+      continue;
     for (int face = 0; face < 6; face++) {
       int k = face / 2;
       int32_t centre[3] = {c[0], c[1], c[2]};
@@ -423,8 +423,10 @@ static batten_status fit_lattice(tracker *tr, const double *lower, const double 
   for (int k = 0; k < 3; k++) {
     double length = upper[k] - lower[k], cubes = fmax(1, round(length / cell));
     if (!(cubes <= CUBES_MAX))
-      return batten_fail(tr->ctx, BATTEN_E_TOO_LARGE, "opt.cell: %g cubes along axis %d of the box, at most %d; "
-                         "enlarge it", cubes, k, CUBES_MAX);
+      return batten_fail(tr->ctx, BATTEN_E_TOO_LARGE,
+                         "opt.cell: %g cubes along axis %d of the box, at most %d; "
+                         "enlarge it",
+                         cubes, k, CUBES_MAX);
     tr->lower[k] = lower[k];
     tr->upper[k] = upper[k];
     tr->limit[k] = 2 * (int32_t)cubes;

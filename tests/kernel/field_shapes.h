@@ -33,8 +33,7 @@ static inline void shape_turn(shape *s, double a, double b) {
 
 static inline void shape_to_world(const shape *s, const double *u, double *x) {
   for (int k = 0; k < 3; k++)
-    x[k] = s->origin[k] +
-           s->scale * (s->rotation[0][k] * u[0] + s->rotation[1][k] * u[1] + s->rotation[2][k] * u[2]);
+    x[k] = s->origin[k] + s->scale * (s->rotation[0][k] * u[0] + s->rotation[1][k] * u[1] + s->rotation[2][k] * u[2]);
 }
 
 static inline batten_status shape_evaluate(const void *user, batten_context *ctx, size_t count, const double *points,

@@ -60,11 +60,12 @@ static inline polygonized polygonize(batten_context *ctx, shape *s, const batten
 }
 
 static inline void polygonized_print(const char *name, const polygonized *p) {
-  printf("# %-10s V %6zu F %6zu angles %4.1f .. %5.1f, above 20 degrees %.4f, edges / cell %.2f %.2f %.2f, "
-         "evaluations / V %.1f, distance %.1e\n",
-         name, p->m.vertices, p->m.triangles, p->m.angle_min_deg, p->m.angle_max_deg, p->m.angles_above_20deg,
-         p->m.edge_min / p->info.cell, p->m.edge_mean / p->info.cell, p->m.edge_max / p->info.cell,
-         (double)p->info.evaluations / (double)p->m.vertices, p->info.distance_max);
+  printf(
+      "# %-10s V %6zu F %6zu angles %4.1f .. %5.1f, above 20 degrees %.4f, edges / cell %.2f %.2f %.2f, "
+      "evaluations / V %.1f, distance %.1e\n",
+      name, p->m.vertices, p->m.triangles, p->m.angle_min_deg, p->m.angle_max_deg, p->m.angles_above_20deg,
+      p->m.edge_min / p->info.cell, p->m.edge_mean / p->info.cell, p->m.edge_max / p->info.cell,
+      (double)p->info.evaluations / (double)p->m.vertices, p->info.distance_max);
 }
 
 #endif

@@ -56,9 +56,9 @@ static void test_fields(void) {
   T_OK(batten_mesh_set_field(ctx, mesh, "curvature", 1, a), ctx);
   T_OK(batten_mesh_set_field(ctx, mesh, "gradient", 3, b), ctx);
   const double *got = batten_mesh_field(mesh, 1, &name, &components);
-  T_CHECK(batten_mesh_field_count(mesh) == 2 && !strcmp(name, "gradient") && components == 3 &&
-              !memcmp(got, b, sizeof b),
-          "second field read back");
+  T_CHECK(
+      batten_mesh_field_count(mesh) == 2 && !strcmp(name, "gradient") && components == 3 && !memcmp(got, b, sizeof b),
+      "second field read back");
   T_OK(batten_mesh_set_field(ctx, mesh, "curvature", 3, b), ctx);
   got = batten_mesh_field(mesh, 0, &name, &components);
   T_CHECK(batten_mesh_field_count(mesh) == 2 && !strcmp(name, "curvature") && components == 3 && got[11] == 11,
@@ -86,8 +86,7 @@ static void test_normals(void) {
     batten_mesh *mesh = NULL;
     batten_mesh_create(ctx, 9, vertices, 12, cube_triangles, &mesh);
     T_OK(batten_mesh_vertex_normals(ctx, mesh, normals), ctx);
-    for (int i = 0; i < 24; i++)
-      worst = fmax(worst, fabs(normals[i] - (cube_vertices[i] > 0 ? 1 : -1) / sqrt(3.0)));
+    for (int i = 0; i < 24; i++) worst = fmax(worst, fabs(normals[i] - (cube_vertices[i] > 0 ? 1 : -1) / sqrt(3.0)));
     T_RATIO(worst, 8 * 0x1p-53, "corner normals of a cube of side 2^%d", exponent);
     T_CHECK(normals[24] == 0 && normals[25] == 0 && normals[26] == 0, "no normal at an unused vertex");
     batten_mesh_free(mesh);

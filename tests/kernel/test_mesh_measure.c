@@ -37,7 +37,8 @@ static void test_tetrahedron(void) {
   T_RATIO(fabs(m.inertia[0][0] - 2.0 / 160), 0x1p-52, "moment of inertia 1/80");
   T_RATIO(fabs(m.inertia[0][1] - 1.0 / 480), 0x1p-52, "product of inertia 1/480");
   T_RATIO(fabs(m.angle_min_deg - 45) + fabs(m.angle_max_deg - 90), 1e-13, "angles 45 to 90");
-  T_RATIO(fabs(m.edge_min - 1) + fabs(m.edge_max - sqrt(2.0)) + fabs(m.edge_mean - (1 + sqrt(2.0)) / 2), 1e-15, "edges");
+  T_RATIO(fabs(m.edge_min - 1) + fabs(m.edge_max - sqrt(2.0)) + fabs(m.edge_mean - (1 + sqrt(2.0)) / 2), 1e-15,
+          "edges");
   T_CHECK(m.angles_above_20deg == 1, "all angles above 20");
   uint32_t inward[12];
   for (int i = 0; i < 12; i++) inward[i] = tetra_triangles[i / 3 * 3 + 2 - i % 3];
@@ -50,12 +51,13 @@ static void test_cube(void) {
   /* Far away, and tiny or huge: the figures keep their digits. */
   for (int exponent = -150; exponent <= 150; exponent += 75) {
     double vertices[24], place[3] = {7e6, -3, 1e6 / 3};
-    for (int i = 0; i < 24; i++) vertices[i] = ldexp(cube_vertices[i] + (exponent ? 0 : round(place[i % 3])), exponent);
+    for (int i = 0; i < 24; i++)
+      vertices[i] = ldexp(cube_vertices[i] + (exponent ? 0 : round(place[i % 3])), exponent);
     batten_mesh_measures m = measure(8, vertices, 12, cube_triangles);
     T_RATIO(fabs(ldexp(m.volume, -3 * exponent) - 1), 8 * 0x1p-53, "volume of a cube of side 2^%d", exponent);
     T_RATIO(fabs(ldexp(m.area, -2 * exponent) - 6), 1e-15, "area");
-    T_RATIO(fabs(ldexp(m.inertia[2][2], -5 * exponent) - 1.0 / 6) + fabs(ldexp(m.inertia[1][2], -5 * exponent)), 1e-15,
-            "inertia");
+    T_RATIO(fabs(ldexp(m.inertia[2][2], -5 * exponent) - 1.0 / 6) + fabs(ldexp(m.inertia[1][2], -5 * exponent)),
+            1e-15, "inertia");
     T_CHECK(m.genus == 0 && m.edges == 18 && m.angle_max_deg == 90, "counts");
     T_CHECK(m.upper[0] - m.lower[0] == ldexp(1, exponent), "box");
   }
@@ -87,8 +89,8 @@ static void test_bad_meshes(void) {
 
   uint32_t fins[] = {0, 1, 2, 1, 0, 3, 0, 1, 4};
   m = measure(5, grid, 3, fins);
-  T_CHECK(!m.manifold && m.nonmanifold_edges == 1 && m.nonmanifold_vertices == 0 && !m.oriented && m.components == 1 &&
-              m.boundary_edges == 6,
+  T_CHECK(!m.manifold && m.nonmanifold_edges == 1 && m.nonmanifold_vertices == 0 && !m.oriented &&
+              m.components == 1 && m.boundary_edges == 6,
           "three triangles on an edge");
   uint32_t bow[] = {0, 1, 2, 0, 3, 4};
   m = measure(5, grid, 2, bow);
@@ -178,8 +180,10 @@ static void test_crossings_against_pairs(void) {
     double p[9 * F];
     uint32_t t[3 * F], pair[6] = {0, 1, 2, 3, 4, 5};
     for (int i = 0; i < 9 * F; i++) {
-      if (i % 9 < 3) p[i] = (double)(t_random(&seed) % 10); /* integers: plenty of touching, coplanar, shared */
-      else p[i] = p[i - i % 9 + i % 3] + (double)(t_random(&seed) % 5) - 2;
+      if (i % 9 < 3)
+        p[i] = (double)(t_random(&seed) % 10); /* integers: plenty of touching, coplanar, shared */
+      else
+        p[i] = p[i - i % 9 + i % 3] + (double)(t_random(&seed) % 5) - 2;
     }
     for (uint32_t i = 0; i < 3 * F; i++) t[i] = i;
     size_t count = 0;

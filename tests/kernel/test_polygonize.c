@@ -29,8 +29,8 @@ static void check_shape(const expected *e) {
           100 * p.m.angles_above_20deg);
   double box = sqrt(3.0) * 2.015625 * e->reach;
   T_RATIO(p.info.distance_max / box, 1e-6, "%s: distance from f = 0 over the box", e->name);
-  T_CHECK(!p.info.clipped && p.info.seeds_missed == 0 && p.info.evaluations == s.points, "%s: %zu evaluations counted",
-          e->name, p.info.evaluations);
+  T_CHECK(!p.info.clipped && p.info.seeds_missed == 0 && p.info.evaluations == s.points,
+          "%s: %zu evaluations counted", e->name, p.info.evaluations);
   if (e->volume > 0) {
     /* Corners on a surface with radii of curvature >= 0.35: chords lie inside by less than (edge / 2)^2 / 0.35. */
     double bound = e->cell * e->cell / 0.35 * e->area;

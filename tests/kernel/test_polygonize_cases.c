@@ -141,16 +141,16 @@ static void test_default_box_and_cell(void) {
     size_t n = shape_seeds(&s, 1.3, wanted, 4, seeds);
     polygonized p = polygonize(ctx, &s, NULL, n, seeds);
     double pi = acos(-1);
-    T_CHECK(p.status == BATTEN_OK && p.m.genus == 0 && p.crossings == 0, "%zu seeds, all by default: %zu vertices",
-            n, p.m.vertices);
+    T_CHECK(p.status == BATTEN_OK && p.m.genus == 0 && p.crossings == 0, "%zu seeds, all by default: %zu vertices", n,
+            p.m.vertices);
     T_RATIO(fabs(p.m.volume / (4 * pi / 3) - 1), 3.0 / (double)n, "volume");
     batten_mesh_free(p.mesh);
   }
   size_t n = shape_seeds(&s, 1.3, 200, 4, seeds);
   memcpy(seeds + 3 * n, seeds, 3 * n * sizeof *seeds);
   polygonized p = polygonize(ctx, &s, NULL, n, seeds), twice = polygonize(ctx, &s, NULL, 2 * n, seeds);
-  T_CHECK(twice.status == BATTEN_OK && p.info.cell <= twice.info.cell, "seeds given twice: cell %g, %g",
-          p.info.cell, twice.info.cell);
+  T_CHECK(twice.status == BATTEN_OK && p.info.cell <= twice.info.cell, "seeds given twice: cell %g, %g", p.info.cell,
+          twice.info.cell);
   batten_mesh_free(p.mesh);
   batten_mesh_free(twice.mesh);
   double flat[9] = {1, 0, 0, -1, 0, 0, 0, 1, 0}; /* all in a plane: the box is made from the largest extent */
@@ -172,8 +172,8 @@ static void test_seeds(void) {
   double bad[6] = {0, 0, 0, 2, 0, 0};
   memcpy(seeds + 3 * n, bad, sizeof bad);
   polygonized p = polygonize(ctx, &s, &o, n + 2, seeds);
-  T_CHECK(p.status == BATTEN_OK && p.info.seeds_missed == 2, "%zu of %zu seeds missed: the middle and the one outside",
-          p.info.seeds_missed, n + 2);
+  T_CHECK(p.status == BATTEN_OK && p.info.seeds_missed == 2,
+          "%zu of %zu seeds missed: the middle and the one outside", p.info.seeds_missed, n + 2);
   batten_mesh_free(p.mesh);
   p = polygonize(ctx, &s, &o, 1, seeds);
   T_CHECK(p.status == BATTEN_OK && p.info.seeds_missed == 0 && p.m.closed, "one seed 1.2 cells off finds all of it");
@@ -339,10 +339,12 @@ static void test_refusals(void) {
   T_STATUS(batten_polygonize(ctx, &field, 1, x, &o, &mesh, NULL), BATTEN_E_INVALID, ctx, "opt.accuracy: 0");
   o = good;
   o.lower[1] = 5;
-  T_STATUS(batten_polygonize(ctx, &field, 1, x, &o, &mesh, NULL), BATTEN_E_INVALID, ctx, "opt.lower[1], opt.upper[1]");
+  T_STATUS(batten_polygonize(ctx, &field, 1, x, &o, &mesh, NULL), BATTEN_E_INVALID, ctx,
+           "opt.lower[1], opt.upper[1]");
   o = good;
   o.upper[2] = INFINITY;
-  T_STATUS(batten_polygonize(ctx, &field, 1, x, &o, &mesh, NULL), BATTEN_E_INVALID, ctx, "opt.lower[2], opt.upper[2]");
+  T_STATUS(batten_polygonize(ctx, &field, 1, x, &o, &mesh, NULL), BATTEN_E_INVALID, ctx,
+           "opt.lower[2], opt.upper[2]");
   T_CHECK(!mesh, "failures leave the result alone");
 }
 

@@ -172,7 +172,8 @@ static void test_clipped(void) {
   T_CHECK(batten_outline_loop_count(outline) == 1 && !closed && info.clipped && info.seeds_missed == 4,
           "one open chain; seeds outside and far from the outline are missed: %zu", info.seeds_missed);
   T_CHECK(v[0] == -0.5 && v[2 * (n - 1)] == -0.5, "its ends lie on the box");
-  T_RATIO(fabs(v[1] + sqrt(0.75)) + fabs(v[2 * n - 1] - sqrt(0.75)), 4e-5, "and on the circle, the solid on the left");
+  T_RATIO(fabs(v[1] + sqrt(0.75)) + fabs(v[2 * n - 1] - sqrt(0.75)), 4e-5,
+          "and on the circle, the solid on the left");
   T_CHECK(isnan(batten_outline_area(outline)), "no area");
   T_RATIO(fabs(batten_outline_length(outline) - 4 * acos(-1) / 3), 1e-3, "length");
   batten_outline_free(outline);

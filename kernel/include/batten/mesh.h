@@ -21,7 +21,9 @@ BATTEN_API size_t batten_mesh_triangle_count(const batten_mesh *mesh);
 BATTEN_API const double *batten_mesh_vertices(const batten_mesh *mesh);
 BATTEN_API const uint32_t *batten_mesh_triangles(const batten_mesh *mesh);
 
-/* Named numbers at the vertices: values [V][components], components 1 .. 9; copied; replaces one of the same name. */
+/* Named numbers at the vertices: values [V][components], components 1 .. 9, any values; copied; replaces one of the
+ * same name. Fails: INVALID, TOO_LARGE, NOMEM; the mesh is then as before. batten_mesh_field: NULL beyond the last.
+ */
 BATTEN_API batten_status batten_mesh_set_field(batten_context *ctx, batten_mesh *mesh, const char *name,
                                                size_t components, const double *values);
 BATTEN_API size_t batten_mesh_field_count(const batten_mesh *mesh);
@@ -32,58 +34,77 @@ BATTEN_API const double *batten_mesh_field(const batten_mesh *mesh, size_t index
 BATTEN_API batten_status batten_mesh_vertex_normals(batten_context *ctx, const batten_mesh *mesh, double *normals);
 
 typedef struct batten_mesh_measures {
-  size_t vertices, edges, triangles; /* vertices: those in use */
-  size_t components;
-  int closed;               /* no boundary edge, and at least one triangle */
-  int manifold;             /* every edge in <= 2 triangles, every vertex's triangles one fan */
-  int oriented;             /* neighbours agree */
-  size_t boundary_edges, boundary_loops, nonmanifold_edges, nonmanifold_vertices;
-  long euler;               /* V - E + F */
-  long genus;               /* total over the components of a closed oriented manifold, else -1 */
+  size_t vertices, edges, triangles;     /* vertices: those in use */
+  size_t components;                     /* triangles joined through edges */
+  int closed;                            /* no boundary edge, and at least one triangle */
+  int manifold;                          /* every edge in <= 2 triangles, every vertex's triangles one fan */
+  int oriented;                          /* every inner edge is passed as often one way as the other */
+  size_t boundary_edges, boundary_loops; /* edges of one triangle, and the loops that they form */
+  size_t nonmanifold_edges;              /* in more than two triangles, or with both ends at one vertex */
+  size_t nonmanifold_vertices;           /* whose triangles fall apart into more than one fan */
+  long euler;                            /* V - E + F */
+  long genus;                            /* total over the components of a closed oriented manifold, else -1 */
   double area;
-  double volume;            /* signed; NaN unless closed and oriented */
-  double centroid[3];       /* of the enclosed volume when closed, else of the surface */
-  double inertia[3][3];     /* of the enclosed volume about the centroid, unit density; NaN unless closed */
+  double volume;        /* signed; NaN unless closed and oriented */
+  double centroid[3];   /* of the enclosed volume when closed, else of the surface */
+  double inertia[3][3]; /* of the enclosed volume about the centroid, unit density, the same when turned inside
+                           out; NaN unless closed, oriented and of some volume */
   double lower[3], upper[3];
   double angle_min_deg, angle_max_deg;
   double angles_above_20deg; /* share of triangles with all angles >= 20 degrees */
   double edge_min, edge_mean, edge_max;
 } batten_mesh_measures;
-/* Time O(F log F). */
-BATTEN_API batten_status batten_mesh_measure(batten_context *ctx, const batten_mesh *mesh,
-                                             batten_mesh_measures *out);
+/* Lengths, angles and the box are 0 for a mesh without triangles. Figures keep their digits far from the origin, and
+ * in any unit that does not overflow itself. Time O(V + F). Fails: INVALID, NOMEM. */
+BATTEN_API batten_status batten_mesh_measure(batten_context *ctx, const batten_mesh *mesh, batten_mesh_measures *out);
 
-/* Pairs of triangles that cross each other (neighbours that share a vertex are tested for overlap). Exact
- * up to rounding of the orientation tests; time O(F log F) for even meshes. */
-BATTEN_API batten_status batten_mesh_self_intersections(batten_context *ctx, const batten_mesh *mesh,
-                                                        size_t *pairs);
+/* Pairs of triangles that have more in common than the corners that they share: crossing, touching, folded onto each
+ * other, or given twice. Corners are shared when they lie at the same place, whatever their indices; triangles
+ * without area take no part. Exact: by signs of determinants in expansion arithmetic. Time O(F log F) for even
+ * meshes; on the context's threads. Fails: INVALID, NOMEM. */
+BATTEN_API batten_status batten_mesh_self_intersections(batten_context *ctx, const batten_mesh *mesh, size_t *pairs);
 
 /* ---- the surface f = 0 -------------------------------------------------------------------------- */
 
 typedef struct batten_polygonize_options {
   size_t struct_size;
-  double cell;        /* edge length aimed at, caller's unit; 0 = from the seeds' spacing and box. Default 0. */
-  double lower[3], upper[3]; /* clip box; all 0 = the seeds' box grown by 25 % (surface beyond it is cut) */
-  double accuracy;    /* |f| / |grad f| over the box diagonal at every vertex. Default 1e-6. */
-  unsigned improve;   /* rounds of mesh improvement. Default 8. */
+  double cell; /* edge length aimed at, caller's unit. 0 = 0.7 of the median distance of seeds to their nearest
+                  neighbour, but between 1/200 and 1/30 of the diagonal of the seeds' box. Parts of the solid and gaps
+                  thinner than about one cell may be lost. Default 0. */
+  double lower[3], upper[3]; /* clip box; all 0 = the seeds' box, each side moved out by 25 % of its largest extent.
+                                The field is asked for within it only, but for Newton steps of a third of a cell and
+                                differences of 1e-4 cell */
+  double accuracy;  /* |f| / |grad f| over the clip box's diagonal at every vertex, in (0, 1); smaller costs at most
+                       an evaluation more. Default 1e-6. */
+  unsigned improve; /* rounds of mesh improvement, each half an evaluation per vertex. 0 leaves the slivers of the
+                       lattice, 4 make nearly all angles > 20 degrees. Default 8. */
   size_t evaluations_max; /* give up above so many field evaluations, 0 = none. Default 0. */
 } batten_polygonize_options;
 BATTEN_API batten_polygonize_options batten_polygonize_options_default(void);
 
 typedef struct batten_polygonize_info {
-  size_t evaluations;  /* points at which the field was evaluated */
-  size_t seeds_missed; /* seeds with no surface within two cells */
+  size_t evaluations;  /* points at which the field was evaluated, with or without gradient */
+  size_t seeds_missed; /* seeds outside of the box, or without surface in their lattice cube and two around it */
   double cell;         /* what was used */
-  double distance_max; /* max |f| / |grad f| over the vertices, caller's unit */
+  double distance_max; /* max over the vertices of |f| / |grad f|, or of the width of an interval across the surface
+                          in which f changes its sign (at kinks and jumps of f); caller's unit */
   int clipped;         /* the surface reaches the box and was cut cleanly there */
   size_t self_intersections; /* pairs of triangles that cross, see batten_mesh_self_intersections */
   double time_track_s, time_improve_s;
 } batten_polygonize_info;
 
-/* The surface of the solid f >= 0 through the cells that it crosses near the seeds [seed_count][3] and on from
- * there; triangles counter-clockwise seen from outside (f < 0). The result is a closed oriented 2-manifold, or one
- * with boundary loops on the box (BATTEN_W_CLIPPED). Components without a seed are not found, by design.
- * Fails: INVALID, NOMEM, TOO_LARGE, NOT_FOUND (no seed has f = 0 near it), CANCELLED. info may be NULL. */
+/* The surface of the solid f >= 0, tracked from the seeds [seed_count][3] through the cells that it crosses;
+ * triangles counter-clockwise seen from outside (f < 0). Marching tetrahedra on a body-centred lattice, one batch of
+ * evaluations for each front, then rounds of edge splits, collapses, flips and smoothing on the surface. The result
+ * is an oriented 2-manifold: closed, or with boundary loops that lie on the box (BATTEN_W_CLIPPED). Components
+ * without a seed are not found, by design. A mesh that crosses itself is made again on a lattice of half, then a
+ * quarter of the cell (and then half the edges). Same bits for any order of the seeds and any number of threads.
+ *   field   three-dimensional; order 0 costs six evaluations for a gradient
+ *   Progress phases: "surface", "improve", "settle".
+ * Positive status: BATTEN_W_ACCURACY (accuracy is missed, or the mesh crosses itself), BATTEN_W_CLIPPED.
+ * Fails: INVALID (also: the field is not finite somewhere, the text names the point), NOMEM, TOO_LARGE (cells,
+ * indices, evaluations_max), NOT_FOUND (f changes its sign near no seed), CANCELLED, and as the field fails. info may
+ * be NULL, and is untouched on failure. */
 BATTEN_API batten_status batten_polygonize(batten_context *ctx, const batten_field *field, size_t seed_count,
                                            const double *seeds, const batten_polygonize_options *opt,
                                            batten_mesh **out, batten_polygonize_info *info);
@@ -91,15 +112,17 @@ BATTEN_API batten_status batten_polygonize(batten_context *ctx, const batten_fie
 /* ---- the outline f = 0 in the plane ------------------------------------------------------------- */
 
 typedef struct batten_outline batten_outline;
-/* As batten_polygonize in 2-D: polylines with the solid on their left. cell, lower, upper, accuracy of opt count. */
+/* As batten_polygonize in 2-D: evenly spaced polylines with the solid on their left, open ones (from box to box)
+ * first. cell, lower, upper, accuracy, evaluations_max of opt count. Progress phases: "outline", "settle". */
 BATTEN_API batten_status batten_trace_outline(batten_context *ctx, const batten_field *field, size_t seed_count,
                                               const double *seeds, const batten_polygonize_options *opt,
                                               batten_outline **out, batten_polygonize_info *info);
 BATTEN_API void batten_outline_free(batten_outline *outline);
 BATTEN_API size_t batten_outline_loop_count(const batten_outline *outline);
-/* Vertices of a loop, [*count][2]; *closed non-zero: last joins first (which is not repeated). */
+/* Vertices of a loop, [*count][2]; *closed non-zero: last joins first (which is not repeated). NULL beyond the last
+ * loop; count, closed may be NULL. */
 BATTEN_API const double *batten_outline_loop(const batten_outline *outline, size_t loop, size_t *count, int *closed);
-BATTEN_API double batten_outline_area(const batten_outline *outline);   /* signed, holes subtract */
+BATTEN_API double batten_outline_area(const batten_outline *outline); /* holes subtract; NaN with open polylines */
 BATTEN_API double batten_outline_length(const batten_outline *outline);
 
 #ifdef __cplusplus
