@@ -59,6 +59,9 @@ const char *cli_nearest(const char *text, const char *const *words, size_t count
 void cli_error(const char *format, ...) BATTEN_PRINTF(1, 2);
 int cli_usage(const char *command, const char *format, ...) BATTEN_PRINTF(2, 3);
 
+
+struct cli_outputs;
+
 /* ---- progress.c: context, progress bar, Ctrl-C ---- */
 typedef struct cli_run {
   batten_context *ctx;
@@ -66,6 +69,8 @@ typedef struct cli_run {
   double started, drawn;
   bool line; /* the bar is on the screen */
   unsigned threads;
+  const char *input;                 /* names the points in messages; NULL = none */
+  const struct cli_outputs *outputs; /* their staged names are told as they were given; NULL = none */
 } cli_run;
 
 /* threads 0 = all cores. False after a line on stderr. Ctrl-C cancels the library's work from here on. */

@@ -182,6 +182,8 @@ static int work(request *q) {
   static const char *const kinds[] = {"unknown", "points", "mesh", "solid", "carrier", "document"};
   cli_run run;
   if (!cli_run_open(&run, (unsigned)q->threads, 0, q->quiet)) return CLI_FAILED;
+  run.input = q->input;
+  run.outputs = &q->outputs;
   cli_report report;
   cli_report_open(&report);
   batten_file_kind kind = BATTEN_FILE_UNKNOWN;

@@ -63,7 +63,7 @@ static size_t edit_distance(const char *a, const char *b) {
 
 const char *cli_nearest(const char *text, const char *const *words, size_t count) {
   const char *best = NULL;
-  size_t least = strlen(text) / 3 + 2; /* more than a third wrong is another word */
+  size_t least = strlen(text) / 3 + 1; /* more than a third wrong is another word */
   for (size_t i = 0; i < count; i++) {
     size_t d = edit_distance(text, words[i]);
     if (d < least) {

@@ -72,20 +72,52 @@ void cli_run_close(cli_run *run) {
   run->ctx = NULL;
 }
 
+/* Replaces the first `from` in text [size] by `to`, as far as it fits. */
+static void substitute(char *text, size_t size, const char *from, const char *to) {
+  char *at = strstr(text, from);
+  if (!at) return;
+  size_t head = (size_t)(at - text), tail = strlen(at + strlen(from)), length = strlen(to);
+  if (head + length + tail + 1 > size) return;
+  memmove(at + length, at + strlen(from), tail + 1);
+  memcpy(at, to, length);
+}
+
+/* The library's text in the words of the command line. */
+static void explain(const cli_run *run, batten_status status, char *text, size_t size) {
+  static const char *const words[][2] = {
+      {"opt.merge_radius", "--merge-radius"},  {"opt.lower and opt.upper", "--box"},
+      {"opt.evaluations_max", "evaluations"},  {"opt.normals", "normals in the file"},
+      {"opt.spline.smoothing", "--smoothing"}, {"memory_limit", "--memory"},
+      {"opt.orientation", "--orientation"},    {"opt.cell", "--cell"},
+      {"opt.width, opt.height", "--size"},     {"opt.carrier", "--carrier"},
+  };
+  const char *own = batten_error(run->ctx);
+  bool points = strncmp(own, "points", 6) == 0 || strncmp(own, "matrix", 6) == 0 || strncmp(own, "seeds", 5) == 0;
+  snprintf(text, size, "%s%s%s", points && run->input ? run->input : "", points && run->input ? ": " : "",
+           *own ? own : batten_status_text(status));
+  for (size_t i = 0; i < sizeof words / sizeof *words; i++) substitute(text, size, words[i][0], words[i][1]);
+  for (size_t i = 0; run->outputs && i < run->outputs->count; i++) {
+    const cli_output *f = &run->outputs->items[i];
+    if (f->staged) substitute(text, size, f->staged, f->path);
+  }
+}
+
 int cli_run_failed(cli_run *run, batten_status status) {
   cli_run_clear(run);
   if (status == BATTEN_E_CANCELLED && interrupted) {
     cli_error("interrupted; nothing was written");
     return CLI_INTERRUPTED;
   }
-  const char *text = batten_error(run->ctx);
-  cli_error("%s", *text ? text : batten_status_text(status));
+  char text[1024];
+  explain(run, status, text, sizeof text);
+  cli_error("%s", text);
   return CLI_FAILED;
 }
 
 void cli_run_warn(cli_run *run, batten_status status) {
   if (status <= 0) return;
   cli_run_clear(run);
-  const char *text = batten_error(run->ctx);
-  cli_error("warning: %s", *text ? text : batten_status_text(status));
+  char text[1024];
+  explain(run, status, text, sizeof text);
+  cli_error("warning: %s", text);
 }

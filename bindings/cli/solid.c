@@ -421,6 +421,8 @@ static void work_free(solid_work *w) {
 static int work(solid_request *q) {
   solid_work w = {.request = q};
   if (!cli_run_open(&w.run, q->threads, q->memory, q->quiet)) return CLI_FAILED;
+  w.run.input = q->input;
+  w.run.outputs = &q->outputs;
   int status;
   batten_status st = read_points(&w);
   if (st >= 0) {
