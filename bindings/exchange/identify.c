@@ -75,12 +75,21 @@ static batten_status identify(bx_reader *r, bx_format format, batten_file_kind *
   if (format == BX_UNKNOWN && got >= 4 && !memcmp(bytes, "ply", 3) && is_space(bytes[3])) format = BX_PLY;
   if (format == BX_UNKNOWN && got >= 4 && !memcmp(bytes, "OFF", 3) && is_space(bytes[3])) format = BX_OFF;
   switch (format) {
-    case BX_TEXT: *out = BATTEN_FILE_POINTS; return BATTEN_OK;
-    case BX_STL: *out = BATTEN_FILE_MESH; return BATTEN_OK;
-    case BX_PLY: return identify_ply(r, out);
-    case BX_OBJ: return identify_obj(r, out);
-    case BX_OFF: return identify_off(r, out);
-    default: *out = kind_of_document(bytes, got); return BATTEN_OK;
+    case BX_TEXT:
+      *out = BATTEN_FILE_POINTS;
+      return BATTEN_OK;
+    case BX_STL:
+      *out = BATTEN_FILE_MESH;
+      return BATTEN_OK;
+    case BX_PLY:
+      return identify_ply(r, out);
+    case BX_OBJ:
+      return identify_obj(r, out);
+    case BX_OFF:
+      return identify_off(r, out);
+    default:
+      *out = kind_of_document(bytes, got);
+      return BATTEN_OK;
   }
 }
 

@@ -16,11 +16,8 @@ static size_t feed(void *buffer, size_t size, void *user) {
   source *s = user;
   const unsigned char *bytes;
   size_t got = 0;
-  s->status = bx_peek(s->r, size < AT_ONCE ? size : AT_ONCE, &bytes, &got);
-  if (s->status == BATTEN_OK && s->r->offset == 0 && got >= 3 && !memcmp(bytes, "\xef\xbb\xbf", 3))
-    s->status = bx_read_bytes(s->r, buffer, 3, "text"); /* the byte order mark; what follows comes with the next call */
-  if (s->status == BATTEN_OK && s->r->offset == 3 && got >= 3)
-    s->status = bx_peek(s->r, size < AT_ONCE ? size : AT_ONCE, &bytes, &got);
+  s->status = s->r->offset == 0 ? bx_skip_mark(s->r) : BATTEN_OK;
+  if (s->status == BATTEN_OK) s->status = bx_peek(s->r, size < AT_ONCE ? size : AT_ONCE, &bytes, &got);
   if (s->status == BATTEN_OK) s->status = bx_read_bytes(s->r, buffer, got, "text");
   return s->status == BATTEN_OK ? got : (size_t)-1;
 }
@@ -69,14 +66,20 @@ batten_status bx_json_fail(bx_json *j, const char *format, ...) {
 
 static const char *type_name(const json_t *value) {
   switch (json_typeof(value)) {
-    case JSON_OBJECT: return "an object";
-    case JSON_ARRAY: return "an array";
-    case JSON_STRING: return "a text";
+    case JSON_OBJECT:
+      return "an object";
+    case JSON_ARRAY:
+      return "an array";
+    case JSON_STRING:
+      return "a text";
     case JSON_INTEGER:
-    case JSON_REAL: return "a number";
+    case JSON_REAL:
+      return "a number";
     case JSON_TRUE:
-    case JSON_FALSE: return "true or false";
-    case JSON_NULL: break;
+    case JSON_FALSE:
+      return "true or false";
+    case JSON_NULL:
+      break;
   }
   return "null";
 }
@@ -121,8 +124,10 @@ batten_status bx_get_text(bx_json *j, const json_t *object, const char *key, con
   batten_status st = bx_get(j, object, key, &value);
   if (st != BATTEN_OK) return st;
   size_t mark = bx_enter(j, key);
-  if (json_is_string(value)) *out = json_string_value(value);
-  else st = bx_json_fail(j, "%s, where a text is expected", type_name(value));
+  if (json_is_string(value))
+    *out = json_string_value(value);
+  else
+    st = bx_json_fail(j, "%s, where a text is expected", type_name(value));
   bx_leave(j, mark);
   return st;
 }
@@ -143,7 +148,8 @@ batten_status bx_get_whole(bx_json *j, const json_t *object, const char *key, in
   batten_status st = bx_get_number(j, object, key, &value);
   if (st != BATTEN_OK) return st;
   size_t mark = bx_enter(j, key);
-  if (value >= (double)lower && value <= (double)upper && !(value > floor(value))) *out = (int64_t)value;
+  if (value >= (double)lower && value <= (double)upper && !(value > floor(value)))
+    *out = (int64_t)value;
   else
     st = bx_json_fail(j, "%g, where a whole number from %lld to %lld is expected", value, (long long)lower,
                       (long long)upper);

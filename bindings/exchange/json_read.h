@@ -32,6 +32,7 @@ batten_status bx_get_whole(bx_json *j, const json_t *object, const char *key, in
 /* [count] numbers into out. */
 batten_status bx_get_numbers(bx_json *j, const json_t *object, const char *key, size_t count, double *out);
 /* [*rows][width] numbers in memory of the context; width 0: plain numbers, [*rows]. */
-batten_status bx_get_rows(bx_json *j, const json_t *object, const char *key, size_t width, size_t *rows, double **out);
+batten_status bx_get_rows(bx_json *j, const json_t *object, const char *key, size_t width, size_t *rows,
+                          double **out);
 
 #endif

@@ -19,7 +19,7 @@ static batten_status get_dimension(bx_json *j, const json_t *object, unsigned *n
   return st;
 }
 
-/* ---- splines ---------------------------------------------------------------------------------------------------- */
+/* ---- splines ------------------------------------------------------------------------------------ */
 
 typedef struct spline_arrays {
   double *centers, *coefficients, *gradient_coefficients, *polynomial, *gradient_at_values;
@@ -91,7 +91,7 @@ static batten_status load_spline(bx_json *j, const json_t *object, batten_spline
   return st;
 }
 
-/* ---- carriers and solids, which nest ---------------------------------------------------------------------------- */
+/* ---- carriers and solids, which nest ------------------------------------------------------------ */
 
 static batten_status load_solid_members(bx_json *j, const json_t *object, unsigned depth, batten_solid **out);
 static batten_status load_carrier(bx_json *j, const json_t *object, unsigned n, unsigned depth, batten_carrier **out);
@@ -155,7 +155,8 @@ static batten_status get_nested_solid(bx_json *j, const json_t *object, unsigned
 }
 
 /* Recursion no deeper than BX_CARRIER_DEPTH. */
-static batten_status load_carrier(bx_json *j, const json_t *object, unsigned n, unsigned depth, batten_carrier **out) {
+static batten_status load_carrier(bx_json *j, const json_t *object, unsigned n, unsigned depth,
+                                  batten_carrier **out) {
   enum { VALUES_MAX = 16 }; /* of a box in space: 3 + 3 + 9 + 1 */
   double values[VALUES_MAX];
   batten_carrier *children[2] = {NULL, NULL};
@@ -167,8 +168,10 @@ static batten_status load_carrier(bx_json *j, const json_t *object, unsigned n, 
   const bx_carrier_layout *layout = bx_layout_named(kind);
   char quote[BX_QUOTE_SIZE];
   if (!layout)
-    return bx_json_fail(j, "kind '%s' is not none, ball, ellipsoid, box, cylinder, torus, half-space, union, "
-                        "intersection or solid", bx_quote(kind, strlen(kind), quote));
+    return bx_json_fail(j,
+                        "kind '%s' is not none, ball, ellipsoid, box, cylinder, torus, half-space, union, "
+                        "intersection or solid",
+                        bx_quote(kind, strlen(kind), quote));
   batten_carrier_parts p = {.kind = layout->kind, .n = n, .parameters = values};
   st = get_members(j, object, layout, n, values, &p.parameter_count);
   if (st == BATTEN_OK && layout->child_count) st = get_children(j, object, n, depth, children);
@@ -223,7 +226,7 @@ static batten_status load_solid_members(bx_json *j, const json_t *object, unsign
   return st;
 }
 
-/* ---- documents -------------------------------------------------------------------------------------------------- */
+/* ---- documents ---------------------------------------------------------------------------------- */
 
 /* "batten": KIND, "version": 1 */
 static batten_status check_head(bx_json *j, const json_t *root, const char *kind) {

@@ -14,7 +14,7 @@
 
 #include <string.h>
 
-/* ---- layouts of carriers ---------------------------------------------------------------------------------------- */
+/* ---- layouts of carriers ------------------------------------------------------------------------ */
 
 static const bx_carrier_layout layouts[] = {
     {BATTEN_CARRIER_NONE, 0, {{0}}, 0},
@@ -51,15 +51,17 @@ const bx_carrier_layout *bx_layout_named(const char *kind_name) {
   return NULL;
 }
 
-/* ---- can it be saved? ------------------------------------------------------------------------------------------- */
+/* ---- can it be saved? --------------------------------------------------------------------------- */
 
 /* Before a file is opened: no callbacks, not too deep. Recursion no deeper than BX_CARRIER_DEPTH. */
 static batten_status check_carrier(batten_context *ctx, const batten_carrier *carrier, unsigned depth) {
   batten_carrier_parts parts;
   batten_carrier_get_parts(carrier, &parts);
   if (!bx_layout_of(parts.kind))
-    return batten_fail(ctx, BATTEN_E_INVALID, "carrier: a %s cannot be saved, its function is the host's; replace it by "
-                       "another carrier", batten_carrier_kind_name(parts.kind));
+    return batten_fail(ctx, BATTEN_E_INVALID,
+                       "carrier: a %s cannot be saved, its function is the host's; replace it by "
+                       "another carrier",
+                       batten_carrier_kind_name(parts.kind));
   if (depth >= BX_CARRIER_DEPTH)
     return batten_fail(ctx, BATTEN_E_TOO_LARGE, "carrier: nested deeper than %d", BX_CARRIER_DEPTH);
   batten_status st = BATTEN_OK;
@@ -69,7 +71,7 @@ static batten_status check_carrier(batten_context *ctx, const batten_carrier *ca
   return st;
 }
 
-/* ---- writing ---------------------------------------------------------------------------------------------------- */
+/* ---- writing ------------------------------------------------------------------------------------ */
 
 static void put_array(bx_writer *w, const double *values, size_t count) {
   bx_put_text(w, "[");
@@ -124,7 +126,9 @@ static void put_carrier(bx_writer *w, const batten_carrier *carrier) {
   for (unsigned i = 0; i < layout->member_count; i++) {
     bx_print(w, ", \"%s\": ", layout->members[i].name);
     switch (layout->members[i].shape) {
-      case BX_NUMBER: bx_put_number(w, *values++); break;
+      case BX_NUMBER:
+        bx_put_number(w, *values++);
+        break;
       case BX_VECTOR:
         put_array(w, values, p.n);
         values += p.n;

@@ -13,13 +13,13 @@
 typedef struct obj {
   bx_reader *r;
   bx_soup *soup;
-  uint64_t highest;            /* largest vertex number in a face, and its line */
+  uint64_t highest; /* largest vertex number in a face, and its line */
   uint64_t highest_line;
-  uint32_t *normal_of;         /* [normal_of_count] index of a vn, or NO_NORMAL */
+  uint32_t *normal_of; /* [normal_of_count] index of a vn, or NO_NORMAL */
   size_t normal_of_count, normal_of_capacity;
-  double *file_normals;        /* vn lines, [file_normal_count][3] */
+  double *file_normals; /* vn lines, [file_normal_count][3] */
   size_t file_normal_count, file_normal_capacity;
-  bool corner_normals;         /* some corner named one */
+  bool corner_normals; /* some corner named one */
   uint64_t highest_normal, highest_normal_line;
 } obj;
 
@@ -82,8 +82,10 @@ static batten_status read_corner(obj *o, const char *word, size_t length) {
   bool given[3] = {false, false, false};
   for (int i = 0; i < 3 && at < end; i++) {
     given[i] = bx_parse_integer(at, &at, &number[i]) == BX_NUMBER_OK;
-    if (at < end && *at == '/') at++;
-    else break;
+    if (at < end && *at == '/')
+      at++;
+    else
+      break;
   }
   if (at != end || !given[0])
     return bx_fail_line(o->r, "corner '%s' is not v, v/vt, v//vn or v/vt/vn", bx_quote(word, length, quote));

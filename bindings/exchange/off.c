@@ -1,4 +1,5 @@
-/* OFF of Geomview: [ST][C][N]OFF, counts, then a line for each vertex and each face; # comments, blank lines anywhere.
+/* OFF of Geomview: [ST][C][N]OFF, counts, then a line for each vertex and each face; # comments, blank lines
+ * anywhere.
  *
  * The keyword may be missing, the counts may stand on its line, and colours or texture coordinates behind the numbers
  * that count are passed over. */
@@ -42,8 +43,7 @@ static batten_status read_keyword(off *o, const char **at) {
                         bx_quote(word, length, quote));
   const char *next = behind;
   length = bx_next_word(&next, &word);
-  if (bx_word_is(word, length, "BINARY"))
-    return bx_fail_line(o->r, "OFF BINARY is not read; save the file as text");
+  if (bx_word_is(word, length, "BINARY")) return bx_fail_line(o->r, "OFF BINARY is not read; save the file as text");
   *at = behind;
   return BATTEN_OK;
 }
@@ -61,7 +61,8 @@ static batten_status read_vertex(off *o) {
   const char *at;
   double x[6];
   batten_status st = next_content(o, "a vertex", &at);
-  for (int i = 0; st == BATTEN_OK && i < (o->has_normals ? 6 : 3); i++) st = bx_next_number(o->r, &at, names[i], &x[i]);
+  for (int i = 0; st == BATTEN_OK && i < (o->has_normals ? 6 : 3); i++)
+    st = bx_next_number(o->r, &at, names[i], &x[i]);
   if (st == BATTEN_OK) st = bx_add_vertex(o->soup, x);
   if (st == BATTEN_OK && o->has_normals) st = bx_add_normal(o->soup, x + 3);
   return st;

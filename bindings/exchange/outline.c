@@ -31,7 +31,8 @@ static void write_svg(bx_writer *w, const batten_outline *outline) {
   double view[4] = {b.lower[0] - margin, -b.upper[1] - margin, width + 2 * margin, height + 2 * margin};
   bx_put_text(w, "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"");
   bx_put_numbers(w, view, 4);
-  bx_put_text(w, "\">\n  <path transform=\"scale(1 -1)\" fill=\"#c9d8e8\" fill-rule=\"evenodd\" stroke=\"#1f3a5f\" "
+  bx_put_text(w,
+              "\">\n  <path transform=\"scale(1 -1)\" fill=\"#c9d8e8\" fill-rule=\"evenodd\" stroke=\"#1f3a5f\" "
               "stroke-width=\"");
   bx_put_number(w, size / 400);
   bx_put_text(w, "\" stroke-linejoin=\"round\" d=\"");
@@ -135,8 +136,10 @@ static void write_vtp(bx_writer *w, const batten_outline *outline) {
   size_t loops = batten_outline_loop_count(outline), points, entries;
   count_outline(outline, &points, &entries);
   vtk_begin(&v, "PolyData");
-  bx_print(w, "    <Piece NumberOfPoints=\"%zu\" NumberOfVerts=\"0\" NumberOfLines=\"%zu\" NumberOfStrips=\"0\" "
-           "NumberOfPolys=\"0\">\n      <Points>\n", points, loops);
+  bx_print(w,
+           "    <Piece NumberOfPoints=\"%zu\" NumberOfVerts=\"0\" NumberOfLines=\"%zu\" NumberOfStrips=\"0\" "
+           "NumberOfPolys=\"0\">\n      <Points>\n",
+           points, loops);
   vtk_declare(&v, "Float64", "Points", 3, points, sizeof(double));
   bx_put_text(w, "      </Points>\n      <Lines>\n");
   vtk_declare(&v, "Int64", "connectivity", 1, entries, sizeof(int64_t));
@@ -160,16 +163,25 @@ batten_status batten_write_outline(batten_context *ctx, const batten_outline *ou
   if (st != BATTEN_OK) return st;
   bx_format format = bx_format_of(path, NULL);
   if (format != BX_SVG && format != BX_TEXT && format != BX_VTP && format != BX_OBJ)
-    return batten_fail(ctx, BATTEN_E_INVALID, "%s: outlines are written as .svg .csv .xyz .txt .vtp .obj; rename the "
-                       "file", bx_short_path(path));
+    return batten_fail(ctx, BATTEN_E_INVALID,
+                       "%s: outlines are written as .svg .csv .xyz .txt .vtp .obj; rename the "
+                       "file",
+                       bx_short_path(path));
   bx_writer w;
   st = bx_create(&w, ctx, path);
   if (st != BATTEN_OK) return st;
   switch (format) {
-    case BX_SVG: write_svg(&w, outline); break;
-    case BX_VTP: write_vtp(&w, outline); break;
-    case BX_OBJ: write_obj(&w, outline); break;
-    default: write_text(&w, outline, is_csv(path));
+    case BX_SVG:
+      write_svg(&w, outline);
+      break;
+    case BX_VTP:
+      write_vtp(&w, outline);
+      break;
+    case BX_OBJ:
+      write_obj(&w, outline);
+      break;
+    default:
+      write_text(&w, outline, is_csv(path));
   }
   return bx_commit(&w);
 }

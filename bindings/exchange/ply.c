@@ -13,9 +13,9 @@ typedef struct ply {
   bx_reader *r;
   bx_soup *soup;
   ply_header header;
-  const char *at;     /* in the current line of a text file */
-  double *fields;     /* [soup->field_count] of the current vertex */
-  int64_t vertices;   /* declared: what corners may refer to */
+  const char *at;   /* in the current line of a text file */
+  double *fields;   /* [soup->field_count] of the current vertex */
+  int64_t vertices; /* declared: what corners may refer to */
 } ply;
 
 static size_t size_of(ply_type type) {
@@ -32,16 +32,24 @@ static double decode(ply_type type, bool big, const unsigned char *bytes) {
   float single;
   double value;
   switch (type) {
-    case PLY_INT8: return (double)(bits & 0x7f) - (double)(bits & 0x80);
-    case PLY_INT16: return (double)(bits & 0x7fff) - (double)(bits & 0x8000);
-    case PLY_INT32: return (double)(bits & 0x7fffffff) - (double)(bits & 0x80000000u);
-    case PLY_FLOAT32: memcpy(&single, &bits32, sizeof single); return (double)single;
-    case PLY_FLOAT64: memcpy(&value, &bits, sizeof value); return value;
-    default: return (double)bits;
+    case PLY_INT8:
+      return (double)(bits & 0x7f) - (double)(bits & 0x80);
+    case PLY_INT16:
+      return (double)(bits & 0x7fff) - (double)(bits & 0x8000);
+    case PLY_INT32:
+      return (double)(bits & 0x7fffffff) - (double)(bits & 0x80000000u);
+    case PLY_FLOAT32:
+      memcpy(&single, &bits32, sizeof single);
+      return (double)single;
+    case PLY_FLOAT64:
+      memcpy(&value, &bits, sizeof value);
+      return value;
+    default:
+      return (double)bits;
   }
 }
 
-/* The next number of the element; in text the words of its line, in binary the next bytes. Whole numbers come exact. */
+/* The next number of the element: in text a word of its line, in binary the next bytes. Whole numbers are exact. */
 static batten_status next_value(ply *p, const ply_property *property, ply_type type, double *out) {
   unsigned char bytes[8];
   if (p->header.encoding == PLY_TEXT) {

@@ -1,4 +1,4 @@
-/* The header of a PLY file, shared by its two parts: reading it (ply_header.c) and reading what it describes (ply.c). */
+/* The header of a PLY file, shared by its reading (ply_header.c) and the reading of what it describes (ply.c). */
 #ifndef BATTEN_EXCHANGE_PLY_H
 #define BATTEN_EXCHANGE_PLY_H
 
@@ -6,16 +6,28 @@
 
 typedef enum ply_type {
   PLY_NO_TYPE = 0,
-  PLY_INT8, PLY_UINT8, PLY_INT16, PLY_UINT16, PLY_INT32, PLY_UINT32, PLY_FLOAT32, PLY_FLOAT64
+  PLY_INT8,
+  PLY_UINT8,
+  PLY_INT16,
+  PLY_UINT16,
+  PLY_INT32,
+  PLY_UINT32,
+  PLY_FLOAT32,
+  PLY_FLOAT64
 } ply_type;
 
 typedef enum ply_encoding { PLY_TEXT, PLY_LITTLE_ENDIAN, PLY_BIG_ENDIAN } ply_encoding;
 
 typedef enum ply_role {
   PLY_SKIPPED = 0,
-  PLY_X, PLY_Y, PLY_Z, PLY_NX, PLY_NY, PLY_NZ,
-  PLY_FIELD,   /* another number of a vertex */
-  PLY_CORNERS  /* the list of a face */
+  PLY_X,
+  PLY_Y,
+  PLY_Z,
+  PLY_NX,
+  PLY_NY,
+  PLY_NZ,
+  PLY_FIELD,  /* another number of a vertex */
+  PLY_CORNERS /* the list of a face */
 } ply_role;
 
 typedef struct ply_property {

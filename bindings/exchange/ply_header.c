@@ -26,10 +26,10 @@ static batten_status read_type(bx_reader *r, const char **at, ply_type *out) {
   static const struct {
     const char *name;
     ply_type type;
-  } types[] = {{"char", PLY_INT8},      {"int8", PLY_INT8},      {"uchar", PLY_UINT8},   {"uint8", PLY_UINT8},
-               {"short", PLY_INT16},    {"int16", PLY_INT16},    {"ushort", PLY_UINT16}, {"uint16", PLY_UINT16},
-               {"int", PLY_INT32},      {"int32", PLY_INT32},    {"uint", PLY_UINT32},   {"uint32", PLY_UINT32},
-               {"float", PLY_FLOAT32},  {"float32", PLY_FLOAT32}, {"double", PLY_FLOAT64}, {"float64", PLY_FLOAT64}};
+  } types[] = {{"char", PLY_INT8},     {"int8", PLY_INT8},       {"uchar", PLY_UINT8},    {"uint8", PLY_UINT8},
+               {"short", PLY_INT16},   {"int16", PLY_INT16},     {"ushort", PLY_UINT16},  {"uint16", PLY_UINT16},
+               {"int", PLY_INT32},     {"int32", PLY_INT32},     {"uint", PLY_UINT32},    {"uint32", PLY_UINT32},
+               {"float", PLY_FLOAT32}, {"float32", PLY_FLOAT32}, {"double", PLY_FLOAT64}, {"float64", PLY_FLOAT64}};
   const char *word;
   size_t length = bx_next_word(at, &word);
   for (size_t i = 0; i < sizeof types / sizeof types[0]; i++)
@@ -46,9 +46,12 @@ static batten_status read_format(bx_reader *r, const char *at, ply_header *h) {
   const char *word, *version;
   size_t length = bx_next_word(&at, &word), version_length = bx_next_word(&at, &version);
   char quote[BX_QUOTE_SIZE];
-  if (bx_word_is(word, length, "ascii")) h->encoding = PLY_TEXT;
-  else if (bx_word_is(word, length, "binary_little_endian")) h->encoding = PLY_LITTLE_ENDIAN;
-  else if (bx_word_is(word, length, "binary_big_endian")) h->encoding = PLY_BIG_ENDIAN;
+  if (bx_word_is(word, length, "ascii"))
+    h->encoding = PLY_TEXT;
+  else if (bx_word_is(word, length, "binary_little_endian"))
+    h->encoding = PLY_LITTLE_ENDIAN;
+  else if (bx_word_is(word, length, "binary_big_endian"))
+    h->encoding = PLY_BIG_ENDIAN;
   else
     return bx_fail_line(r, "format '%s' is not ascii, binary_little_endian or binary_big_endian",
                         bx_quote(word, length, quote));
@@ -125,8 +128,7 @@ batten_status ply_read_header(bx_reader *r, ply_header *h) {
   *h = (ply_header){0};
   bool end, has_format = false;
   batten_status st = bx_next_line(r, &end);
-  if (st == BATTEN_OK && strcmp(r->text, "ply"))
-    st = bx_fail_line(r, "a PLY file begins with the line 'ply'");
+  if (st == BATTEN_OK && strcmp(r->text, "ply")) st = bx_fail_line(r, "a PLY file begins with the line 'ply'");
   while (st == BATTEN_OK) {
     st = bx_next_line(r, &end);
     if (st != BATTEN_OK) return st;

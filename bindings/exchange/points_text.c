@@ -14,13 +14,13 @@ enum { X, Y, Z, NX, NY, NZ, ROLES, COLUMNS_MAX = 256 };
 typedef struct table {
   bx_reader *r;
   bx_soup *soup;
-  unsigned n;             /* asked for, 0 = open */
-  size_t columns;         /* 0 = no line of numbers yet */
-  char separator;         /* of the numbers */
-  bool named;             /* columns come from names */
-  bool names_in_comment;  /* which count only when they fit the numbers */
+  unsigned n;            /* asked for, 0 = open */
+  size_t columns;        /* 0 = no line of numbers yet */
+  char separator;        /* of the numbers */
+  bool named;            /* columns come from names */
+  bool names_in_comment; /* which count only when they fit the numbers */
   size_t named_columns;
-  int role[ROLES];        /* column of x, y, ...; -1 = none */
+  int role[ROLES]; /* column of x, y, ...; -1 = none */
   bool has_normals;
 } table;
 
@@ -65,14 +65,12 @@ static size_t count_fields(const char *line, size_t length, char separator) {
 
 static char lower(char c) { return c >= 'A' && c <= 'Z' ? (char)(c + ('a' - 'A')) : c; }
 
-static bool is_alphanumeric(char c) {
-  return (c >= '0' && c <= '9') || (lower(c) >= 'a' && lower(c) <= 'z');
-}
+static bool is_alphanumeric(char c) { return (c >= '0' && c <= '9') || (lower(c) >= 'a' && lower(c) <= 'z'); }
 
 /* X .. NZ for x, "X", x_m, "y [mm]", Nx, normal_z ...; -1 for other names. */
 static int role_of(field f) {
-  static const char *const names[] = {"x", "y", "z", "nx", "ny", "nz", "normal_x", "normal_y", "normal_z",
-                                      "normalx", "normaly", "normalz"};
+  static const char *const names[] = {"x",        "y",        "z",        "nx",      "ny",      "nz",
+                                      "normal_x", "normal_y", "normal_z", "normalx", "normaly", "normalz"};
   while (f.length && (*f.text == '"' || *f.text == '\'')) f = (field){f.text + 1, f.length - 1};
   for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
     size_t length = strlen(names[i]), k = 0;
@@ -125,8 +123,10 @@ static batten_status choose_roles(table *t) {
                     : t->columns == 6              ? spatial_normals
                                                    : NULL;
   if (!role)
-    return bx_fail_line(t->r, "%zu column%s without names; 2, 3, 4 (x y nx ny) or 6 (x y z nx ny nz) are known, for "
-                        "others put a line of names above: x y z nx ny nz", t->columns, t->columns == 1 ? "" : "s");
+    return bx_fail_line(t->r,
+                        "%zu column%s without names; 2, 3, 4 (x y nx ny) or 6 (x y z nx ny nz) are known, for "
+                        "others put a line of names above: x y z nx ny nz",
+                        t->columns, t->columns == 1 ? "" : "s");
   memcpy(t->role, role, sizeof t->role);
   return BATTEN_OK;
 }
@@ -154,8 +154,10 @@ static batten_status fail_field(table *t, size_t column, field f) {
   for (size_t i = 0; t->separator == ',' && i < f.length; i++)
     if (is_space(f.text[i])) {
       char quote[BX_QUOTE_SIZE];
-      return bx_fail_line(t->r, "%s: '%s' holds a blank; separate by commas or by blanks, and write a point as the "
-                          "decimal sign", name, bx_quote(f.text, f.length, quote));
+      return bx_fail_line(t->r,
+                          "%s: '%s' holds a blank; separate by commas or by blanks, and write a point as the "
+                          "decimal sign",
+                          name, bx_quote(f.text, f.length, quote));
     }
   return bx_fail_number(t->r, name, f.text, f.length, false);
 }

@@ -46,8 +46,10 @@ batten_status bx_read_mesh_from(bx_reader *r, bx_format format, batten_mesh **ou
   for (size_t i = 0; st == BATTEN_OK && i < soup.field_count; i++)
     st = add_column(r->ctx, mesh, soup.field_names[i], soup.vertex_count, soup.field_values + i, soup.field_count);
   bx_soup_free(&soup);
-  if (st == BATTEN_OK) *out = mesh;
-  else batten_mesh_free(mesh);
+  if (st == BATTEN_OK)
+    *out = mesh;
+  else
+    batten_mesh_free(mesh);
   return st;
 }
 
@@ -57,8 +59,10 @@ batten_status batten_read_mesh(batten_context *ctx, const char *path, batten_mes
   bool gz;
   bx_format format = bx_format_of(path, &gz);
   if (format < BX_PLY || format > BX_STL)
-    return batten_fail(ctx, BATTEN_E_INVALID, "%s: meshes are read from .ply .obj .off .stl, each also with .gz; "
-                       "rename the file", bx_short_path(path));
+    return batten_fail(ctx, BATTEN_E_INVALID,
+                       "%s: meshes are read from .ply .obj .off .stl, each also with .gz; "
+                       "rename the file",
+                       bx_short_path(path));
   bx_reader r;
   st = bx_open(&r, ctx, path);
   if (st != BATTEN_OK) return st;

@@ -20,7 +20,8 @@ static batten_status flatten(bx_reader *r, bx_soup *soup) {
   for (size_t i = 0; i < soup->vertex_count; i++) {
     const double *x = soup->vertices + 3 * i;
     if (x[2] < 0 || x[2] > 0)
-      return batten_fail(r->ctx, BATTEN_E_FORMAT, "%s: points[%zu]: z = %g, but n = 2 asks for plane points; take n = 3",
+      return batten_fail(r->ctx, BATTEN_E_FORMAT,
+                         "%s: points[%zu]: z = %g, but n = 2 asks for plane points; take n = 3",
                          bx_short_path(r->path), i, x[2]);
     soup->vertices[2 * i] = x[0];
     soup->vertices[2 * i + 1] = x[1];
@@ -37,7 +38,8 @@ static batten_status check_dimension(bx_reader *r, bx_soup *soup, unsigned n) {
   if (soup->vertex_count == 0)
     return batten_fail(r->ctx, BATTEN_E_FORMAT, "%s: no points in the file", bx_short_path(r->path));
   if (n == 3 && soup->n == 2)
-    return batten_fail(r->ctx, BATTEN_E_FORMAT, "%s: the points have x and y only, but n = 3 was asked for; take n = 2",
+    return batten_fail(r->ctx, BATTEN_E_FORMAT,
+                       "%s: the points have x and y only, but n = 3 was asked for; take n = 2",
                        bx_short_path(r->path));
   return n == 2 && soup->n == 3 ? flatten(r, soup) : BATTEN_OK;
 }
@@ -52,8 +54,8 @@ batten_status bx_read_points_from(bx_reader *r, bx_format format, unsigned n, ba
   if (st == BATTEN_OK) st = check_dimension(r, &soup, n);
   if (st == BATTEN_OK) {
     bool normals = soup.normal_count == soup.vertex_count;
-    *out = (batten_cloud){.n = soup.n, .count = soup.vertex_count, .points = soup.vertices,
-                          .normals = normals ? soup.normals : NULL};
+    *out = (batten_cloud){
+        .n = soup.n, .count = soup.vertex_count, .points = soup.vertices, .normals = normals ? soup.normals : NULL};
     soup.vertices = NULL;
     if (normals) soup.normals = NULL;
   }
@@ -72,8 +74,10 @@ batten_status batten_read_points(batten_context *ctx, const char *path, const ba
   bool gz;
   bx_format format = bx_format_of(path, &gz);
   if (format < BX_TEXT || format > BX_STL)
-    return batten_fail(ctx, BATTEN_E_INVALID, "%s: points are read from .xyz .txt .csv .tsv .asc .dat .ply .obj .off "
-                       ".stl, each also with .gz; rename the file", bx_short_path(path));
+    return batten_fail(ctx, BATTEN_E_INVALID,
+                       "%s: points are read from .xyz .txt .csv .tsv .asc .dat .ply .obj .off "
+                       ".stl, each also with .gz; rename the file",
+                       bx_short_path(path));
   bx_reader r;
   st = bx_open(&r, ctx, path);
   if (st != BATTEN_OK) return st;

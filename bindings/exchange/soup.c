@@ -80,8 +80,8 @@ batten_status bx_add_corner(bx_soup *soup, uint32_t vertex) {
   if (soup->corners == 1) soup->first = vertex;
   if (soup->corners >= 3 && soup->want_triangles) {
     void *grown = soup->triangles;
-    batten_status st = bx_grow(soup->ctx, &grown, &soup->triangle_capacity, soup->triangle_count + 1,
-                               3 * sizeof *soup->triangles);
+    batten_status st =
+        bx_grow(soup->ctx, &grown, &soup->triangle_capacity, soup->triangle_count + 1, 3 * sizeof *soup->triangles);
     soup->triangles = grown;
     if (st != BATTEN_OK) return st;
     uint32_t *t = soup->triangles + 3 * soup->triangle_count++;

@@ -14,9 +14,9 @@ typedef struct bx_soup {
   bool want_triangles; /* else faces are checked but not kept */
   unsigned n;          /* coordinates of a vertex, 2 or 3 */
   size_t vertex_count, vertex_capacity;
-  double *vertices;    /* [vertex_count][n] */
+  double *vertices; /* [vertex_count][n] */
   size_t normal_count, normal_capacity;
-  double *normals;     /* [normal_count][n]; of use when normal_count == vertex_count */
+  double *normals; /* [normal_count][n]; of use when normal_count == vertex_count */
   size_t triangle_count, triangle_capacity;
   uint32_t *triangles; /* [triangle_count][3] */
   /* numbers at the vertices */

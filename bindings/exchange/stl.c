@@ -1,8 +1,8 @@
 /* STL, text and binary. Corners with the same three coordinates become one vertex (-0 is 0); a triangle that has lost
  * a corner by that has no area and is dropped.
  *
- * Binary files may begin with "solid" as text does. What tells: a size of exactly 84 + 50 F bytes is binary; otherwise
- * "solid" at the start and no byte of value 0 in the first block is text. */
+ * Binary files may begin with "solid" as text does. What tells: a size of exactly 84 + 50 F bytes is binary;
+ * otherwise "solid" at the start and no byte of value 0 in the first block is text. */
 #include "soup.h"
 
 #include "base/checked.h"
@@ -35,8 +35,7 @@ static size_t hash(const double x[3]) {
 /* The slot of x, or the free one where it belongs. */
 static size_t find_slot(const welder *w, const double x[3]) {
   size_t slot = hash(x) & (w->slot_count - 1);
-  while (w->slots[slot] != FREE_SLOT &&
-         memcmp(w->soup->vertices + 3 * (size_t)w->slots[slot], x, 3 * sizeof *x))
+  while (w->slots[slot] != FREE_SLOT && memcmp(w->soup->vertices + 3 * (size_t)w->slots[slot], x, 3 * sizeof *x))
     slot = (slot + 1) & (w->slot_count - 1);
   return slot;
 }
@@ -157,7 +156,8 @@ static batten_status is_binary(bx_reader *r, bool *binary) {
   size_t got;
   batten_status st = bx_peek(r, LOOKED_AT, &bytes, &got);
   if (st != BATTEN_OK) return st;
-  bool sized = got >= HEADER + 4 && bx_size_known(r) && r->size == HEADER + 4 + (uint64_t)RECORD * u32_at(bytes + HEADER);
+  bool sized =
+      got >= HEADER + 4 && bx_size_known(r) && r->size == HEADER + 4 + (uint64_t)RECORD * u32_at(bytes + HEADER);
   size_t at = got >= 3 && !memcmp(bytes, "\xef\xbb\xbf", 3) ? 3 : 0;
   while (at < got && (bytes[at] == ' ' || bytes[at] == '\t' || bytes[at] == '\r' || bytes[at] == '\n')) at++;
   bool solid = got - at >= 5 && (!memcmp(bytes + at, "solid", 5) || !memcmp(bytes + at, "SOLID", 5));

@@ -22,7 +22,7 @@ enum {
   GZIP_WITH_HEADER = 15 + 16 /* inflateInit2: largest window, gzip header and checksum */
 };
 
-/* ---- errors ----------------------------------------------------------------------------------------------------- */
+/* ---- errors ------------------------------------------------------------------------------------- */
 
 const char *bx_short_path(const char *path) {
   size_t length = strlen(path);
@@ -59,7 +59,7 @@ static batten_status fail_errno(bx_reader *r, const char *what, int error) {
   return batten_fail(r->ctx, BATTEN_E_IO, "%s: cannot %s: %s%s", bx_short_path(r->path), what, text, remedy);
 }
 
-/* ---- bytes ------------------------------------------------------------------------------------------------------ */
+/* ---- bytes -------------------------------------------------------------------------------------- */
 
 static batten_status read_raw(bx_reader *r, unsigned char *to, size_t room, size_t *got) {
   *got = 0;
@@ -140,8 +140,8 @@ static batten_status fill(bx_reader *r) {
     r->capacity *= 2;
   }
   size_t room = r->capacity - r->end, got = 0;
-  batten_status st = r->is_gzip ? inflate_some(r, r->buffer + r->end, room, &got)
-                                : read_raw(r, r->buffer + r->end, room, &got);
+  batten_status st =
+      r->is_gzip ? inflate_some(r, r->buffer + r->end, room, &got) : read_raw(r, r->buffer + r->end, room, &got);
   r->end += got;
   if (!r->is_gzip) r->ended = r->raw_ended;
   return st;
@@ -228,9 +228,9 @@ batten_status bx_read_bytes(bx_reader *r, void *to, size_t count, const char *wh
   return BATTEN_OK;
 }
 
-/* ---- lines ------------------------------------------------------------------------------------------------------ */
+/* ---- lines -------------------------------------------------------------------------------------- */
 
-static batten_status skip_byte_order_mark(bx_reader *r) {
+batten_status bx_skip_mark(bx_reader *r) {
   batten_status st = peek_at_least(r, 3);
   if (st == BATTEN_OK && r->end - r->begin >= 3 && !memcmp(r->buffer + r->begin, "\xef\xbb\xbf", 3)) {
     r->begin += 3;
@@ -241,7 +241,7 @@ static batten_status skip_byte_order_mark(bx_reader *r) {
 
 batten_status bx_next_line(bx_reader *r, bool *end) {
   *end = false;
-  batten_status st = r->offset == 0 ? skip_byte_order_mark(r) : BATTEN_OK;
+  batten_status st = r->offset == 0 ? bx_skip_mark(r) : BATTEN_OK;
   if (st != BATTEN_OK) return st;
   r->line++;
   size_t length = 0;

@@ -10,20 +10,20 @@
 
 typedef struct bx_reader {
   batten_context *ctx;
-  const char *path;            /* for messages and the extension */
-  uint64_t size;               /* bytes of the file as it lies there, 0 = not known */
-  uint64_t line;               /* number of the line that bx_next_line gave last */
-  uint64_t offset;             /* of the next byte, counted behind decompression */
-  char *text;                  /* the line that bx_next_line gave last */
+  const char *path; /* for messages and the extension */
+  uint64_t size;    /* bytes of the file as it lies there, 0 = not known */
+  uint64_t line;    /* number of the line that bx_next_line gave last */
+  uint64_t offset;  /* of the next byte, counted behind decompression */
+  char *text;       /* the line that bx_next_line gave last */
   /* inside */
-  int file;                    /* -1: memory */
+  int file; /* -1: memory */
   const unsigned char *memory;
   size_t memory_left;
   uint64_t raw_read;
   bool raw_ended, ended, is_gzip, inflating;
   z_stream zip;
-  unsigned char *raw;          /* compressed bytes, only with is_gzip */
-  unsigned char *buffer;       /* window on the content: [begin, end) is still to be read */
+  unsigned char *raw;    /* compressed bytes, only with is_gzip */
+  unsigned char *buffer; /* window on the content: [begin, end) is still to be read */
   size_t begin, end, capacity;
 } bx_reader;
 
@@ -41,6 +41,9 @@ batten_status bx_peek(bx_reader *r, size_t count, const unsigned char **bytes, s
 
 /* The next count bytes, or FORMAT: "byte N: the file ends here; `what` is missing". */
 batten_status bx_read_bytes(bx_reader *r, void *to, size_t count, const char *what);
+
+/* Passes over a byte order mark of UTF-8, which may stand in front of all. */
+batten_status bx_skip_mark(bx_reader *r);
 
 /* The next line in r->text without its end (LF, CRLF or CR), or *end. A byte order mark before the first is dropped.
  * Refuses lines above 1 MiB and bytes of value 0. */

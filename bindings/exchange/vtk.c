@@ -10,11 +10,20 @@
 static void put_attribute(bx_writer *w, const char *text) {
   for (; *text; text++) {
     switch (*text) {
-      case '&': bx_put_text(w, "&amp;"); break;
-      case '<': bx_put_text(w, "&lt;"); break;
-      case '>': bx_put_text(w, "&gt;"); break;
-      case '"': bx_put_text(w, "&quot;"); break;
-      default: bx_put_u8(w, (unsigned char)*text < ' ' ? (uint8_t)'_' : (uint8_t)*text);
+      case '&':
+        bx_put_text(w, "&amp;");
+        break;
+      case '<':
+        bx_put_text(w, "&lt;");
+        break;
+      case '>':
+        bx_put_text(w, "&gt;");
+        break;
+      case '"':
+        bx_put_text(w, "&quot;");
+        break;
+      default:
+        bx_put_u8(w, (unsigned char)*text < ' ' ? (uint8_t)'_' : (uint8_t)*text);
     }
   }
 }
@@ -83,8 +92,10 @@ void bx_write_vtp(bx_writer *w, const batten_mesh *mesh) {
   vtk_file v = {.w = w};
   size_t triangles = batten_mesh_triangle_count(mesh);
   vtk_begin(&v, "PolyData");
-  bx_print(w, "    <Piece NumberOfPoints=\"%zu\" NumberOfVerts=\"0\" NumberOfLines=\"0\" NumberOfStrips=\"0\" "
-           "NumberOfPolys=\"%zu\">\n", batten_mesh_vertex_count(mesh), triangles);
+  bx_print(w,
+           "    <Piece NumberOfPoints=\"%zu\" NumberOfVerts=\"0\" NumberOfLines=\"0\" NumberOfStrips=\"0\" "
+           "NumberOfPolys=\"%zu\">\n",
+           batten_mesh_vertex_count(mesh), triangles);
   declare_points_and_fields(&v, mesh);
   bx_put_text(w, "      <Polys>\n");
   vtk_declare(&v, "Int64", "connectivity", 1, 3 * triangles, sizeof(int64_t));
@@ -101,7 +112,8 @@ void bx_write_vtu(bx_writer *w, const batten_mesh *mesh) {
   vtk_file v = {.w = w};
   size_t triangles = batten_mesh_triangle_count(mesh);
   vtk_begin(&v, "UnstructuredGrid");
-  bx_print(w, "    <Piece NumberOfPoints=\"%zu\" NumberOfCells=\"%zu\">\n", batten_mesh_vertex_count(mesh), triangles);
+  bx_print(w, "    <Piece NumberOfPoints=\"%zu\" NumberOfCells=\"%zu\">\n", batten_mesh_vertex_count(mesh),
+           triangles);
   declare_points_and_fields(&v, mesh);
   bx_put_text(w, "      <Cells>\n");
   vtk_declare(&v, "Int64", "connectivity", 1, 3 * triangles, sizeof(int64_t));

@@ -15,14 +15,14 @@
 
 typedef struct bx_writer {
   batten_context *ctx;
-  const char *path;  /* the caller's, for messages */
-  char *target;      /* what is replaced: path with its symbolic links followed */
-  char *part;        /* what is written; NULL = target itself, when it is a device or a pipe */
+  const char *path; /* the caller's, for messages */
+  char *target;     /* what is replaced: path with its symbolic links followed */
+  char *part;       /* what is written; NULL = target itself, when it is a device or a pipe */
   int file;
   batten_status status;
   unsigned char *buffer;
   size_t used;
-  uint64_t written;  /* bytes handed over so far */
+  uint64_t written; /* bytes handed over so far */
 } bx_writer;
 
 /* path stays the caller's until bx_commit. On failure nothing is left and bx_commit need not be called. */

@@ -118,8 +118,10 @@ static batten_status check_stl(batten_context *ctx, const batten_mesh *mesh, con
   const double *x = batten_mesh_vertices(mesh);
   for (size_t i = 0; i < 3 * batten_mesh_vertex_count(mesh); i++)
     if (!(fabs(x[i]) <= (double)FLT_MAX))
-      return batten_fail(ctx, BATTEN_E_INVALID, "%s: vertices[%zu]: %g is too large for the single precision of STL; "
-                         "write .ply", bx_short_path(path), i / 3, x[i]);
+      return batten_fail(ctx, BATTEN_E_INVALID,
+                         "%s: vertices[%zu]: %g is too large for the single precision of STL; "
+                         "write .ply",
+                         bx_short_path(path), i / 3, x[i]);
   return BATTEN_OK;
 }
 
@@ -157,7 +159,8 @@ batten_status batten_write_mesh(batten_context *ctx, const batten_mesh *mesh, co
                                                     : format == BX_VTU ? bx_write_vtu
                                                                        : NULL;
   if (!write)
-    return batten_fail(ctx, BATTEN_E_INVALID, "%s: meshes are written as .ply .obj .off .stl .vtp .vtu; rename the file",
+    return batten_fail(ctx, BATTEN_E_INVALID,
+                       "%s: meshes are written as .ply .obj .off .stl .vtp .vtu; rename the file",
                        bx_short_path(path));
   if (format == BX_STL) st = check_stl(ctx, mesh, path);
   if (st != BATTEN_OK) return st;

@@ -1,4 +1,4 @@
-/* Documents: same bits back for every kind of carrier in 1, 2 and 3 dimensions, gradients, nesting; what is refused. */
+/* Documents: same bits back for every kind of carrier in 1, 2, 3 dimensions, gradients, nesting; what is refused. */
 #include "files.h"
 
 enum { PROBES = 40 };
@@ -124,7 +124,8 @@ static void test_solid(batten_context *ctx, scratch *s, unsigned n, bool gradien
     T_CHECK(same_field(ctx, &a, &b), "n = %u%s: values, gradients and Hessians have the same bits", n,
             gradients ? ", gradient data" : "");
     T_CHECK(!memcmp(box[0], box[2], sizeof box[0]) && !memcmp(box[1], box[3], sizeof box[1]) &&
-                batten_solid_sign(back) == -1, "box and sign");
+                batten_solid_sign(back) == -1,
+            "box and sign");
     T_OK(batten_save_solid(ctx, back, scratch_file(s, "second.json")), ctx);
     T_CHECK(files_equal(first, s->name), "saved again: the same bytes");
   }
@@ -149,9 +150,9 @@ static batten_status load_text(batten_context *ctx, const char *text, bool carri
 }
 
 #define HEAD "{\"batten\": \"solid\", \"version\": 1, \"n\": 2, \"sign\": 1, \"lower\": [0, 0], \"upper\": [1, 1], "
-#define SPLINE(centers, coefficients) \
-  "\"spline\": {\"n\": 2, \"m\": 2, \"origin\": [0, 0], \"scale\": 1, \"polynomial\": [0, 0, 0], \"centers\": " \
-  centers ", \"coefficients\": " coefficients "}, "
+#define SPLINE(centers, coefficients)                                                              \
+  "\"spline\": {\"n\": 2, \"m\": 2, \"origin\": [0, 0], \"scale\": 1, \"polynomial\": [0, 0, 0], " \
+  "\"centers\": " centers ", \"coefficients\": " coefficients "}, "
 #define GOOD SPLINE("[[0, 0], [1, 0], [0, 1]]", "[1, -1, 0]")
 #define BALL "\"carrier\": {\"kind\": \"ball\", \"center\": [0, 0], \"radius\": 1}}"
 #define CARRIER "{\"batten\": \"carrier\", \"version\": 1, \"n\": 2, \"carrier\": "
@@ -173,7 +174,8 @@ static void test_refused(batten_context *ctx) {
       {"{\"batten\": \"carrier\", \"version\": 1}", "holds a batten 'carrier', not a solid", false},
       {"{\"batten\": \"solid\", \"version\": 2}", "document.version: 2, where a whole number from 1 to 1", false},
       {"{\"batten\": \"solid\", \"version\": 1}", "solid: 'n' is missing", false},
-      {"{\"batten\": \"solid\", \"version\": 1, \"n\": 2.5}", "solid.n: 2.5, where a whole number from 1 to 3", false},
+      {"{\"batten\": \"solid\", \"version\": 1, \"n\": 2.5}", "solid.n: 2.5, where a whole number from 1 to 3",
+       false},
       {"{\"batten\": \"solid\", \"version\": 1, \"n\": 2, \"sign\": 1, \"lower\": [0]}",
        "solid.lower: 1 numbers, where 2 are expected", false},
       {"{\"batten\": \"solid\", \"version\": 1, \"n\": 2, \"sign\": 1, \"lower\": [0, null]}",
@@ -188,21 +190,26 @@ static void test_refused(batten_context *ctx) {
       {HEAD SPLINE("7", "[1, -1]") BALL, "solid.spline.centers: a number, where an array is expected", false},
       {HEAD "\"spline\": {\"n\": 2, \"m\": 1}}", "solid.spline: 'origin' is missing", false},
       {HEAD "\"spline\": {\"n\": 2, \"m\": 2, \"origin\": [0, 0], \"scale\": 0, \"polynomial\": [0, 0, 0], "
-       "\"centers\": [], \"coefficients\": []}}", "solid.spline: parts.scale: 0", false},
-      {HEAD "\"spline\": {\"n\": 2, \"m\": 3, \"origin\": [0, 0], \"scale\": 1, \"polynomial\": [0, 0, 0, 0, 0, 0], "
+            "\"centers\": [], \"coefficients\": []}}",
+       "solid.spline: parts.scale: 0", false},
+      {HEAD
+       "\"spline\": {\"n\": 2, \"m\": 3, \"origin\": [0, 0], \"scale\": 1, \"polynomial\": [0, 0, 0, 0, 0, 0], "
        "\"centers\": [[0, 0]], \"coefficients\": [1], \"gradient_at\": [1.5], \"gradient_coefficients\": [[0, 0]]}}",
        "solid.spline.gradient_at[0]: 1.5, where the number of a center", false},
       {HEAD GOOD "\"carrier\": {}}", "solid.carrier: 'kind' is missing", false},
       {HEAD GOOD "\"carrier\": 5}", "solid.carrier: a number, where an object is expected", false},
-      {"{\"batten\": \"solid\", \"version\": 1, \"n\": 2, \"sign\": 0, \"lower\": [0, 0], \"upper\": [1, 1], " GOOD BALL,
+      {"{\"batten\": \"solid\", \"version\": 1, \"n\": 2, \"sign\": 0, \"lower\": [0, 0], \"upper\": [1, 1], " GOOD
+           BALL,
        "solid: sign: 0", false},
       {CARRIER "{\"kind\": \"callback\"}}", "carrier: kind 'callback' is not none, ball", true},
       {CARRIER "{\"kind\": \"ball\", \"center\": [0, 0]}}", "carrier: 'radius' is missing", true},
       {CARRIER "{\"kind\": \"ball\", \"center\": [0, 0], \"radius\": -1}}", "carrier: radius: -1", true},
       {CARRIER "{\"kind\": \"torus\", \"center\": [0, 0], \"axis\": [0, 1], \"major_radius\": 1, "
-       "\"minor_radius\": 0.5}}", "carrier: ", true},
+               "\"minor_radius\": 0.5}}",
+       "carrier: ", true},
       {CARRIER "{\"kind\": \"box\", \"center\": [0, 0], \"half_extents\": [1, 1], \"rotation\": [[1, 0]], "
-       "\"rounding\": 0}}", "carrier: 1 in 'rotation', but 2 in 'n'", true},
+               "\"rounding\": 0}}",
+       "carrier: 1 in 'rotation', but 2 in 'n'", true},
       {CARRIER "{\"kind\": \"union\", \"alpha\": 0, \"children\": [{\"kind\": \"none\"}]}}",
        "carrier: 'children' must be an array of two carriers", true},
       {CARRIER "{\"kind\": \"union\", \"alpha\": 0, \"children\": [{\"kind\": \"none\"}, {\"kind\": \"x\"}]}}",
@@ -225,7 +232,8 @@ static void test_depth(batten_context *ctx) {
   char *text = malloc(DEPTH * 120), *at = text + sprintf(text, CARRIER);
   for (int levels = 64; levels <= 66; levels += 2) {
     char *to = at;
-    for (int i = 0; i < levels; i++) to += sprintf(to, "{\"kind\":\"union\",\"alpha\":0,\"children\":[{\"kind\":\"none\"},");
+    for (int i = 0; i < levels; i++)
+      to += sprintf(to, "{\"kind\":\"union\",\"alpha\":0,\"children\":[{\"kind\":\"none\"},");
     to += sprintf(to, "{\"kind\":\"none\"}");
     for (int i = 0; i < levels; i++) to += sprintf(to, "]}");
     sprintf(to, "}");

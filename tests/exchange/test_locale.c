@@ -91,7 +91,8 @@ int main(void) {
     T_CHECK(!strcmp(printed, "0,5") && !strcmp(text, "0.5"), "where printf writes %s, here it is %s", printed, text);
     write_all(ctx, &s, mesh, carrier, 1);
     T_CHECK(same_files(&s, "mesh", "obj") && same_files(&s, "mesh", "off") && same_files(&s, "mesh", "ply") &&
-                same_files(&s, "mesh", "vtp") && same_files(&s, "carrier", "json"), "the same bytes are written");
+                same_files(&s, "mesh", "vtp") && same_files(&s, "carrier", "json"),
+            "the same bytes are written");
     test_reading(ctx, &s, x);
   } else {
     t_skip("a locale with a decimal comma", "none installed, and localedef does not make one");

@@ -16,19 +16,36 @@ typedef struct sample {
 
 static const sample samples[] = {
     {"a.off", "OFF\n4 1 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3 255 0 0\n", 4, 2, {0, 1, 2, 0, 2, 3}},
-    {"counts.off", "COFF 4 4 6\n0 0 0 255 0 0 1\n1 0 0 .1 .1 .1 1\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n",
-     4, 4, {0, 2, 1, 0, 1, 3}},
-    {"a.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nusemtl a\nf 1 2/1 3//1 4/1/1\nvn 0 0 1\n", 4, 2,
+    {"counts.off",
+     "COFF 4 4 6\n0 0 0 255 0 0 1\n1 0 0 .1 .1 .1 1\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n",
+     4,
+     4,
+     {0, 2, 1, 0, 1, 3}},
+    {"a.obj",
+     "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nusemtl a\nf 1 2/1 3//1 4/1/1\nvn 0 0 1\n",
+     4,
+     2,
      {0, 1, 2, 0, 2, 3}},
-    {"back.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nf -3 -2 -1\nv 0 1 0\nf -4 \\\n -2 \\\n-1 # c\n", 4, 2, {0, 1, 2, 0, 2, 3}},
+    {"back.obj",
+     "v 0 0 0\nv 1 0 0\nv 1 1 0\nf -3 -2 -1\nv 0 1 0\nf -4 \\\n -2 \\\n-1 # c\n",
+     4,
+     2,
+     {0, 1, 2, 0, 2, 3}},
     {"late.obj", "f 1 2 3\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 2 2 2\nf 1 3 4\n", 4, 2, {0, 1, 2, 0, 2, 3}},
-    {"a.ply", "ply\nformat ascii 1.0\nelement face 1\nproperty uchar red\nproperty list uchar int vertex_index\n"
+    {"a.ply",
+     "ply\nformat ascii 1.0\nelement face 1\nproperty uchar red\nproperty list uchar int vertex_index\n"
      "element vertex 4\nproperty float x\nproperty float y\nproperty float z\nelement edge 1\nproperty int a\n"
-     "end_header\n7 4 0 1 2 3\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n1\n", 4, 2, {0, 1, 2, 0, 2, 3}},
-    {"a.stl", "solid\nfacet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1 0\nendloop\nendfacet\n"
+     "end_header\n7 4 0 1 2 3\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n1\n",
+     4,
+     2,
+     {0, 1, 2, 0, 2, 3}},
+    {"a.stl",
+     "solid\nfacet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1 0\nendloop\nendfacet\n"
      "facet normal 0 0 0\nouter loop\nvertex 0 0 -0\nvertex 1 1 0\nvertex 0 1 0\nendloop\nendfacet\n"
      "facet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 0 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n",
-     4, 2, {0, 1, 2, 0, 2, 3}},
+     4,
+     2,
+     {0, 1, 2, 0, 2, 3}},
 };
 enum { SAMPLES = sizeof samples / sizeof samples[0] };
 
@@ -76,18 +93,20 @@ static void test_round_trip(batten_context *ctx, scratch *s, const char *extensi
   T_OK(batten_read_mesh(ctx, second, &again), ctx);
   size_t bytes = sizeof(double) * 12;
   T_CHECK(!memcmp(batten_mesh_vertices(back), batten_mesh_vertices(again), bytes) &&
-              (!exact || !memcmp(batten_mesh_vertices(m), batten_mesh_vertices(back), bytes)), "%s: coordinates",
-          extension);
+              (!exact || !memcmp(batten_mesh_vertices(m), batten_mesh_vertices(back), bytes)),
+          "%s: coordinates", extension);
   /* STL has lost the numbering: its vertices are in the order of the facets. */
-  T_CHECK(batten_mesh_triangle_count(back) == 4 &&
-              (!exact || !memcmp(batten_mesh_triangles(back), faces, sizeof faces)), "%s: triangles", extension);
+  T_CHECK(
+      batten_mesh_triangle_count(back) == 4 && (!exact || !memcmp(batten_mesh_triangles(back), faces, sizeof faces)),
+      "%s: triangles", extension);
   if (strcmp(extension, "ply")) {
     T_CHECK(files_equal(first, second), "%s: written, read, written: the same bytes", extension);
   } else {
     size_t fields = batten_mesh_field_count(back), components;
     const char *field = "";
     const double *values = fields == 4 ? batten_mesh_field(back, 3, &field, &components) : NULL;
-    T_CHECK(values && !strcmp(field, "gradient_2") && components == 1 && values[3] == sin(11), "ply: fields come back");
+    T_CHECK(values && !strcmp(field, "gradient_2") && components == 1 && values[3] == sin(11),
+            "ply: fields come back");
     T_CHECK(files_equal(first, second), "ply: written, read, written: the same bytes");
   }
   batten_file_kind kind = BATTEN_FILE_UNKNOWN;
@@ -137,7 +156,8 @@ static void test_bytes(batten_context *ctx, scratch *s) {
   bytes = file_read(s->name, &size);
   float normal_z;
   memcpy(&normal_z, bytes + 84 + 8, 4);
-  T_CHECK(size == 84 + 4 * 50 && bytes[80] == 4 && normal_z == -1, "STL: size, count, normal (little-endian machine)");
+  T_CHECK(size == 84 + 4 * 50 && bytes[80] == 4 && normal_z == -1,
+          "STL: size, count, normal (little-endian machine)");
   free(bytes);
   batten_mesh_free(m);
 }
@@ -172,7 +192,8 @@ static void test_write_failures(batten_context *ctx, scratch *s) {
   T_OK(batten_write_mesh(ctx, m, link), ctx);
   struct stat info;
   T_CHECK(!lstat(link, &info) && S_ISLNK(info.st_mode) && !stat(real, &info) && info.st_size > 3 &&
-              (info.st_mode & 0777) == 0640, "a file behind a link is replaced, the link and the mode stay");
+              (info.st_mode & 0777) == 0640,
+          "a file behind a link is replaced, the link and the mode stay");
   double huge[9] = {1e300, 0, 0, 0, 1, 0, 0, 0, 1};
   batten_mesh *large = NULL;
   T_OK(batten_mesh_create(ctx, 3, huge, 1, faces + 1, &large), ctx);

@@ -18,21 +18,52 @@ static bool same(const char *text) {
   size_t length;
   char *end;
   double mine = parsed(text, &state, &length), theirs = strtod(text, &end);
-  bool ok = isinf(theirs) ? state == BX_NUMBER_TOO_LARGE && length == (size_t)(end - text)
-                          : state == BX_NUMBER_OK && !memcmp(&mine, &theirs, sizeof mine) &&
-                                length == (size_t)(end - text);
+  bool ok = isinf(theirs)
+                ? state == BX_NUMBER_TOO_LARGE && length == (size_t)(end - text)
+                : state == BX_NUMBER_OK && !memcmp(&mine, &theirs, sizeof mine) && length == (size_t)(end - text);
   if (!ok) printf("# '%.80s': %a, strtod %a\n", text, mine, theirs);
   return ok;
 }
 
 static void test_by_hand(void) {
-  static const char *const texts[] = {
-      "0", "-0", "1", "+1.5", ".5", "5.", "1e3", "1E-3", "1e", "1e+", "12abc", "1.2.3", "00012.5000",
-      "9007199254740993", "9007199254740992.99999999999999999999", "9007199254740993.00000000000000000001",
-      "1.7976931348623157e308", "1.7976931348623158e308", "1.7976931348623159e308", "1e309", "1e400", "-1e99999999999",
-      "4.9406564584124654e-324", "2.4703282292062327e-324", "2.4703282292062328e-324", "1e-400", "1e-99999999999",
-      "2.2250738585072011e-308", "2.2250738585072014e-308", "6.631236846766476e-316", "123456789012345678901234567890",
-      "0.1", "0.3", "1e22", "1e23", "8.5e22", "7.2057594037927945e16", "0.000000000000000000000000000000000000001"};
+  static const char *const texts[] = {"0",
+                                      "-0",
+                                      "1",
+                                      "+1.5",
+                                      ".5",
+                                      "5.",
+                                      "1e3",
+                                      "1E-3",
+                                      "1e",
+                                      "1e+",
+                                      "12abc",
+                                      "1.2.3",
+                                      "00012.5000",
+                                      "9007199254740993",
+                                      "9007199254740992.99999999999999999999",
+                                      "9007199254740993.00000000000000000001",
+                                      "1.7976931348623157e308",
+                                      "1.7976931348623158e308",
+                                      "1.7976931348623159e308",
+                                      "1e309",
+                                      "1e400",
+                                      "-1e99999999999",
+                                      "4.9406564584124654e-324",
+                                      "2.4703282292062327e-324",
+                                      "2.4703282292062328e-324",
+                                      "1e-400",
+                                      "1e-99999999999",
+                                      "2.2250738585072011e-308",
+                                      "2.2250738585072014e-308",
+                                      "6.631236846766476e-316",
+                                      "123456789012345678901234567890",
+                                      "0.1",
+                                      "0.3",
+                                      "1e22",
+                                      "1e23",
+                                      "8.5e22",
+                                      "7.2057594037927945e16",
+                                      "0.000000000000000000000000000000000000001"};
   size_t bad = 0;
   for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++) bad += !same(texts[i]);
   T_CHECK(bad == 0, "%zu numbers by hand as strtod reads them, %zu differ", sizeof texts / sizeof texts[0], bad);
@@ -40,10 +71,11 @@ static void test_by_hand(void) {
     const char *text;
     bx_number_state state;
     size_t length;
-  } others[] = {{"nan", BX_NUMBER_NOT_FINITE, 3},  {"-inf", BX_NUMBER_NOT_FINITE, 4}, {"Infinity", BX_NUMBER_NOT_FINITE, 8},
-                {"", BX_NUMBER_NONE, 0},           {"x", BX_NUMBER_NONE, 0},          {"-", BX_NUMBER_NONE, 0},
-                {".", BX_NUMBER_NONE, 0},          {"e5", BX_NUMBER_NONE, 0},         {"+-1", BX_NUMBER_NONE, 0},
-                {"1,5", BX_NUMBER_OK, 1},            {"0x10", BX_NUMBER_OK, 1}};
+  } others[] = {
+      {"nan", BX_NUMBER_NOT_FINITE, 3}, {"-inf", BX_NUMBER_NOT_FINITE, 4}, {"Infinity", BX_NUMBER_NOT_FINITE, 8},
+      {"", BX_NUMBER_NONE, 0},          {"x", BX_NUMBER_NONE, 0},          {"-", BX_NUMBER_NONE, 0},
+      {".", BX_NUMBER_NONE, 0},         {"e5", BX_NUMBER_NONE, 0},         {"+-1", BX_NUMBER_NONE, 0},
+      {"1,5", BX_NUMBER_OK, 1},         {"0x10", BX_NUMBER_OK, 1}};
   for (size_t i = 0; i < sizeof others / sizeof others[0]; i++) {
     bx_number_state state;
     size_t length;
@@ -117,9 +149,13 @@ static void test_integer(void) {
     const char *text;
     bx_number_state state;
     int64_t value;
-  } cases[] = {{"0", BX_NUMBER_OK, 0},          {"-12", BX_NUMBER_OK, -12}, {"+7", BX_NUMBER_OK, 7},
-               {"4294967296", BX_NUMBER_OK, 4294967296}, {"99999999999999999999999", BX_NUMBER_TOO_LARGE, 0},
-               {"x", BX_NUMBER_NONE, 0},        {"1.5", BX_NUMBER_OK, 1}};
+  } cases[] = {{"0", BX_NUMBER_OK, 0},
+               {"-12", BX_NUMBER_OK, -12},
+               {"+7", BX_NUMBER_OK, 7},
+               {"4294967296", BX_NUMBER_OK, 4294967296},
+               {"99999999999999999999999", BX_NUMBER_TOO_LARGE, 0},
+               {"x", BX_NUMBER_NONE, 0},
+               {"1.5", BX_NUMBER_OK, 1}};
   for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
     int64_t value = 0;
     const char *end;

@@ -64,7 +64,8 @@ static void test_text(batten_context *ctx, scratch *s, const batten_outline *out
   const double *first = batten_outline_loop(outline, 0, &first_count, NULL);
   T_OK(batten_read_points(ctx, s->name, NULL, &back), ctx);
   T_CHECK(back.n == 2 && back.count == all + loops - open_loops &&
-              !memcmp(back.points, first, 2 * first_count * sizeof(double)), "%s: read back with the same bits", name);
+              !memcmp(back.points, first, 2 * first_count * sizeof(double)),
+          "%s: read back with the same bits", name);
   T_CHECK(count_text(text, "\n\n") == loops - 1, "%s: a blank line between %zu loops", name, loops);
   batten_cloud_free(ctx, &back);
   free(text);
@@ -76,9 +77,9 @@ static void test_formats(batten_context *ctx, scratch *s, const batten_outline *
   test_text(ctx, s, outline, "a.xyz");
   test_text(ctx, s, outline, "a.txt");
   char *text = written(ctx, outline, s, "a.svg");
-  T_CHECK(count_text(text, "\nM ") == loops &&
-              count_text(text, "\nL ") == all - loops && count_text(text, " Z") == loops - open_loops &&
-              strstr(text, "</svg>\n"), "%s: svg has %zu loops, %zu open, %zu corners", what, loops, open_loops, all);
+  T_CHECK(count_text(text, "\nM ") == loops && count_text(text, "\nL ") == all - loops &&
+              count_text(text, " Z") == loops - open_loops && strstr(text, "</svg>\n"),
+          "%s: svg has %zu loops, %zu open, %zu corners", what, loops, open_loops, all);
   free(text);
   text = written(ctx, outline, s, "a.obj");
   T_CHECK(count_text(text, "\nv ") == all && count_text(text, "\nl ") == loops, "%s: obj lines", what);
@@ -116,7 +117,8 @@ int main(void) {
   T_STATUS(batten_write_outline(ctx, outline, scratch_file(&s, "a.stl")), BATTEN_E_INVALID, ctx,
            "written as .svg .csv .xyz .txt .vtp .obj");
   T_STATUS(batten_write_outline(ctx, NULL, "a.svg"), BATTEN_E_INVALID, ctx, "outline: NULL");
-  T_STATUS(batten_write_outline(ctx, outline, scratch_file(&s, "none/a.svg")), BATTEN_E_IO, ctx, "make the directory");
+  T_STATUS(batten_write_outline(ctx, outline, scratch_file(&s, "none/a.svg")), BATTEN_E_IO, ctx,
+           "make the directory");
   write_job job = {outline, scratch_file(&s, "a.svg")};
   t_fail_every_allocation("writing an outline", write_again, &job);
   T_CHECK(scratch_count(&s) == files, "no part files are left");

@@ -17,8 +17,20 @@ static const sample samples[] = {
     {"no_newline.xyz", "1 2 3\n4 5 6", 3, 2, {1, 2, 3, 4, 5, 6}, {0}, false},
     {"crlf.xyz", "1 2 3\r\n4 5 6\r\n\r\n", 3, 2, {1, 2, 3, 4, 5, 6}, {0}, false},
     {"cr.xyz", "1 2 3\r4 5 6\r", 3, 2, {1, 2, 3, 4, 5, 6}, {0}, false},
-    {"bom.csv", "\xef\xbb\xbf" "1,2,3\n4,5,6\n", 3, 2, {1, 2, 3, 4, 5, 6}, {0}, false},
-    {"comments.txt", "# hello\n  // more\n% and\n\n 1\t2  3 # here\n4 5 6 // there\n", 3, 2, {1, 2, 3, 4, 5, 6}, {0},
+    {"bom.csv",
+     "\xef\xbb\xbf"
+     "1,2,3\n4,5,6\n",
+     3,
+     2,
+     {1, 2, 3, 4, 5, 6},
+     {0},
+     false},
+    {"comments.txt",
+     "# hello\n  // more\n% and\n\n 1\t2  3 # here\n4 5 6 // there\n",
+     3,
+     2,
+     {1, 2, 3, 4, 5, 6},
+     {0},
      false},
     {"planar.txt", "1 2\n3 4\n5 6\n", 2, 3, {1, 2, 3, 4, 5, 6}, {0}, false},
     {"planar_normals.txt", "1 2 0 1\n3 4 1 0\n", 2, 2, {1, 2, 3, 4}, {0, 1, 1, 0}, true},
@@ -35,27 +47,63 @@ static const sample samples[] = {
      "ply\nformat ascii 1.0\ncomment x\nelement thing 2\nproperty list uchar int of\nproperty float a\n"
      "element vertex 2\nproperty float y\nproperty uchar red\nproperty double x\nproperty int z\n"
      "property list uchar float weights\nend_header\n0 1\n3 7 8 9 nan\n2 255 1 3 0\n\n5 0 4 6 2 .5 .5\n",
-     3, 2, {1, 2, 3, 4, 5, 6}, {0}, false},
-    {"planar.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float nx\n"
-     "property float ny\nend_header\n1 2 0 1\n", 2, 1, {1, 2}, {0, 1}, true},
-    {"ordered.obj", "# c\nmtllib m\nv 1 2 3\nvn 0 0 1\nv 4 5 6\nvn 0 1 0\n", 3, 2, {1, 2, 3, 4, 5, 6},
-     {0, 0, 1, 0, 1, 0}, true},
-    {"corners.obj", "v 1 2 3 # c\nv 4 5 6 1\nv 7 8 9 .1 .2 .3\nvn 0 0 1\nvn 0 1 0\nf 1//1 2/5/2 3//1\n", 3, 3,
-     {1, 2, 3, 4, 5, 6, 7, 8, 9}, {0, 0, 1, 0, 1, 0, 0, 0, 1}, true},
-    {"some.obj", "v 1 2 3\nv 4 5 6\nv 7 8 9\nvn 0 0 1\nf 1//1 2//1 3\n", 3, 3, {1, 2, 3, 4, 5, 6, 7, 8, 9}, {0}, false},
-    {"n.off", "NOFF # normals\n# comment\n\n2 0 0\n1 2 3 0 0 1\n4 5 6 0 1 0 # end\n", 3, 2, {1, 2, 3, 4, 5, 6},
-     {0, 0, 1, 0, 1, 0}, true},
+     3,
+     2,
+     {1, 2, 3, 4, 5, 6},
+     {0},
+     false},
+    {"planar.ply",
+     "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float nx\n"
+     "property float ny\nend_header\n1 2 0 1\n",
+     2,
+     1,
+     {1, 2},
+     {0, 1},
+     true},
+    {"ordered.obj",
+     "# c\nmtllib m\nv 1 2 3\nvn 0 0 1\nv 4 5 6\nvn 0 1 0\n",
+     3,
+     2,
+     {1, 2, 3, 4, 5, 6},
+     {0, 0, 1, 0, 1, 0},
+     true},
+    {"corners.obj",
+     "v 1 2 3 # c\nv 4 5 6 1\nv 7 8 9 .1 .2 .3\nvn 0 0 1\nvn 0 1 0\nf 1//1 2/5/2 3//1\n",
+     3,
+     3,
+     {1, 2, 3, 4, 5, 6, 7, 8, 9},
+     {0, 0, 1, 0, 1, 0, 0, 0, 1},
+     true},
+    {"some.obj",
+     "v 1 2 3\nv 4 5 6\nv 7 8 9\nvn 0 0 1\nf 1//1 2//1 3\n",
+     3,
+     3,
+     {1, 2, 3, 4, 5, 6, 7, 8, 9},
+     {0},
+     false},
+    {"n.off",
+     "NOFF # normals\n# comment\n\n2 0 0\n1 2 3 0 0 1\n4 5 6 0 1 0 # end\n",
+     3,
+     2,
+     {1, 2, 3, 4, 5, 6},
+     {0, 0, 1, 0, 1, 0},
+     true},
     {"bare.off", "1 0 0\n1 2 3\n", 3, 1, {1, 2, 3}, {0}, false},
     {"stc.off", "STCNOFF 1 0 0\n1 2 3 0 0 1 255 0 0 255 .5 .5\n", 3, 1, {1, 2, 3}, {0, 0, 1}, true},
-    {"t.stl", "solid t\nfacet normal 0 0 1\nouter loop\nvertex 1 2 3\nvertex 4 5 6\nvertex -0 8 9\nendloop\nendfacet\n"
+    {"t.stl",
+     "solid t\nfacet normal 0 0 1\nouter loop\nvertex 1 2 3\nvertex 4 5 6\nvertex -0 8 9\nendloop\nendfacet\n"
      "FACET NORMAL 0 0 1\nOUTER LOOP\nVERTEX 4 5 6\nVERTEX 1 2 3\nVERTEX 0 8 9\nENDLOOP\nENDFACET\nendsolid t\n",
-     3, 3, {1, 2, 3, 4, 5, 6, 0, 8, 9}, {0}, false},
+     3,
+     3,
+     {1, 2, 3, 4, 5, 6, 0, 8, 9},
+     {0},
+     false},
 };
 enum { SAMPLES = sizeof samples / sizeof samples[0] };
 
 static bool agrees(const sample *s, const batten_cloud *c) {
-  return c->n == s->n && c->count == s->count &&
-         !memcmp(c->points, s->points, s->n * s->count * sizeof(double)) && !c->normals == !s->has_normals &&
+  return c->n == s->n && c->count == s->count && !memcmp(c->points, s->points, s->n * s->count * sizeof(double)) &&
+         !c->normals == !s->has_normals &&
          (!c->normals || !memcmp(c->normals, s->normals, s->n * s->count * sizeof(double)));
 }
 
@@ -132,8 +180,9 @@ static void test_dimension(batten_context *ctx) {
   batten_cloud c = {0};
   const char *flat = "1 2 0 0 1 0\n3 4 0 1 0 0\n";
   T_OK(points_of(ctx, "a.xyz", flat, strlen(flat), 2, &c), ctx);
-  T_CHECK(c.n == 2 && c.points[2] == 3 && c.points[3] == 4 && c.normals[0] == 0 && c.normals[1] == 1 &&
-              c.normals[2] == 1, "n = 2 of points with z = 0");
+  T_CHECK(
+      c.n == 2 && c.points[2] == 3 && c.points[3] == 4 && c.normals[0] == 0 && c.normals[1] == 1 && c.normals[2] == 1,
+      "n = 2 of points with z = 0");
   batten_cloud_free(ctx, &c);
   T_STATUS(points_of(ctx, "a.xyz", "1 2 0\n1 2 3\n", 12, 2, &c), BATTEN_E_FORMAT, ctx, "points[1]: z = 3, but n = 2");
   T_STATUS(points_of(ctx, "a.xyz", "1 2\n", 4, 3, &c), BATTEN_E_FORMAT, ctx, "x and y only, but n = 3");
@@ -142,7 +191,9 @@ static void test_dimension(batten_context *ctx) {
 }
 
 static size_t compress_text(const char *text, size_t size, unsigned char *out, size_t room) {
-  z_stream z = {.next_in = (unsigned char *)(uintptr_t)text, .avail_in = (unsigned)size, .next_out = out,
+  z_stream z = {.next_in = (unsigned char *)(uintptr_t)text,
+                .avail_in = (unsigned)size,
+                .next_out = out,
                 .avail_out = (unsigned)room};
   deflateInit2(&z, 9, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY);
   deflate(&z, Z_FINISH);
@@ -243,8 +294,10 @@ static void test_shared(batten_context *ctx) {
   static const struct {
     const char *file;
     size_t count;
-  } data[] = {{"phobos/phobos_thomas_xyz.txt", 16022}, {"vipss/vertebra_500.xyz", 500},
-              {"vipss/torus_gt.obj", 4096}, {"meshes/femur.off", 3897}};
+  } data[] = {{"phobos/phobos_thomas_xyz.txt", 16022},
+              {"vipss/vertebra_500.xyz", 500},
+              {"vipss/torus_gt.obj", 4096},
+              {"meshes/femur.off", 3897}};
   const char *root = getenv("BATTEN_SHARED");
   for (size_t i = 0; i < sizeof data / sizeof data[0]; i++) {
     char path[1024];

@@ -19,16 +19,25 @@ static const char *try_bytes(const char *name, const unsigned char *bytes, size_
 }
 
 static size_t mutate(uint64_t *seed, unsigned char *bytes, size_t size, size_t room) {
-  static const char *const pieces[] = {"2147483648", "-1", "nan", "1e400", "0", " ", "\n", "4294967295", "99999999999999999999",
-                                       ",", ";", "/", "\\\n", "[", "{", "\"", "1e-400", "#", "f 1 2 3\n", "end_header\n"};
+  static const char *const pieces[] = {
+      "2147483648", "-1",   "nan", "1e400", "0",  " ",      "\n", "4294967295", "99999999999999999999", ",", ";",
+      "/",          "\\\n", "[",   "{",     "\"", "1e-400", "#",  "f 1 2 3\n",  "end_header\n"};
   unsigned rounds = 1 + (unsigned)(t_random(seed) % 4);
   for (unsigned i = 0; i < rounds && size; i++) {
     size_t at = t_random(seed) % size, other = t_random(seed) % size, length;
     switch (t_random(seed) % 7) {
-      case 0: bytes[at] ^= (unsigned char)(1u << (t_random(seed) % 8)); break;
-      case 1: bytes[at] = (unsigned char)t_random(seed); break;
-      case 2: bytes[at] = t_random(seed) % 2 ? 0xff : 0; break;
-      case 3: size = at; break;
+      case 0:
+        bytes[at] ^= (unsigned char)(1u << (t_random(seed) % 8));
+        break;
+      case 1:
+        bytes[at] = (unsigned char)t_random(seed);
+        break;
+      case 2:
+        bytes[at] = t_random(seed) % 2 ? 0xff : 0;
+        break;
+      case 3:
+        size = at;
+        break;
       case 4: /* out */
         length = t_random(seed) % (size - at) % 40;
         memmove(bytes + at, bytes + at + length, size - at - length);

@@ -82,9 +82,12 @@ static bool read_once(bx_reader *r, bx_format format, unsigned which, const char
     *wrong = which == 0 ? load_solid(r) : load_carrier(r);
     return true;
   }
-  if (which == 3 && format != BX_TEXT) *wrong = read_mesh(r, format);
-  else if (which < 3) *wrong = read_points(r, format, which ? which + 1 : 0);
-  else return false;
+  if (which == 3 && format != BX_TEXT)
+    *wrong = read_mesh(r, format);
+  else if (which < 3)
+    *wrong = read_points(r, format, which ? which + 1 : 0);
+  else
+    return false;
   return true;
 }
 
@@ -107,7 +110,8 @@ const char *fuzz_read(const char *name, const unsigned char *data, size_t size) 
     bx_close(&r);
     if (!wrong && batten_bytes_in_use(ctx)) wrong = "memory is left";
     /* 400: a byte of text can be a corner that takes a triangle's 12, twice while it grows, and a slot's share */
-    if (!wrong && !gz && batten_bytes_peak(ctx) > (1 << 19) + 400 * size) wrong = "more memory than the bytes account for";
+    if (!wrong && !gz && batten_bytes_peak(ctx) > (1 << 19) + 400 * size)
+      wrong = "more memory than the bytes account for";
   }
   batten_context_free(ctx);
   return wrong;
