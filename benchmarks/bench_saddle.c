@@ -50,7 +50,8 @@ static points make_points(size_t n) {
 #endif
 enum { LANES = 8 };
 
-FILL_CLONES static void fill(const void *user, size_t row0, size_t rows, size_t col0, size_t cols, double *tile, size_t ld) {
+FILL_CLONES static void fill(const void *user, size_t row0, size_t rows, size_t col0, size_t cols, double *tile,
+                             size_t ld) {
   const points *s = user;
   const double *x = s->x + row0, *y = s->y + row0, *z = s->z + row0;
   for (size_t j = 0; j < cols; j++) {
@@ -89,7 +90,9 @@ typedef struct run {
   batten_saddle_info info;
 } run;
 
-static int by_total(const void *a, const void *b) { return by_value(&((const run *)a)->total, &((const run *)b)->total); }
+static int by_total(const void *a, const void *b) {
+  return by_value(&((const run *)a)->total, &((const run *)b)->total);
+}
 
 static run solve_once(batten_context *ctx, const points *s, batten_saddle_method method) {
   batten_saddle_matrix m = {.n = s->n, .k = 4, .p = s->p, .fill = fill, .user = s};
@@ -101,8 +104,10 @@ static run solve_once(batten_context *ctx, const points *s, batten_saddle_method
   batten_status st = w ? batten_saddle_factor(ctx, &m, &o, &h) : BATTEN_E_NOMEM;
   if (st >= 0) st = batten_saddle_solve(ctx, h, s->f, w, w + s->n);
   run r = {.total = batten_now() - start, .cpu = (double)(clock() - cpu) / CLOCKS_PER_SEC};
-  if (st < 0) fprintf(stderr, "N = %zu, %s: %s\n", s->n, batten_saddle_method_name(method), batten_error(ctx));
-  else r.info = batten_saddle_get_info(h);
+  if (st < 0)
+    fprintf(stderr, "N = %zu, %s: %s\n", s->n, batten_saddle_method_name(method), batten_error(ctx));
+  else
+    r.info = batten_saddle_get_info(h);
   batten_saddle_free(h);
   free(w);
   return r;
@@ -124,7 +129,8 @@ static const char *const bare_names[] = {"dgesv", "dsysv", "dpotrf", "spotrf", "
 static void fill_bare(bare routine, const points *s, size_t order, double *a) {
   fill(s, 0, s->n, 0, s->n, a, order);
   for (size_t j = 0; j < s->n; j++) {
-    for (size_t c = 0; c < order - s->n; c++) a[s->n + c + j * order] = a[j + (s->n + c) * order] = s->p[j + c * s->n];
+    for (size_t c = 0; c < order - s->n; c++)
+      a[s->n + c + j * order] = a[j + (s->n + c) * order] = s->p[j + c * s->n];
     if (routine == DPOTRF || routine == SPOTRF) a[j + j * order] = (double)s->n;
   }
   for (size_t c = s->n; c < order; c++) memset(a + s->n + c * order, 0, (order - s->n) * sizeof *a);
@@ -151,11 +157,21 @@ static double time_bare_once(bare routine, const points *s) {
   const double plus = 1, zero = 0;
   double start = batten_now();
   switch (routine) {
-    case DGESV: FORTRAN(dgesv)(&n, &one, a, &n, pivots, b, &n, &info); break;
-    case DSYSV: FORTRAN(dsysv)("L", &n, &one, a, &n, pivots, b, &n, work, &lw, &info, 1); break;
-    case DPOTRF: FORTRAN(dpotrf)("L", &n, a, &n, &info, 1); break;
-    case SPOTRF: FORTRAN(spotrf)("L", &n, (float *)(void *)a, &n, &info, 1); break;
-    case DGEMM: FORTRAN(dgemm)("N", "N", &n, &n, &n, &plus, a, &n, a, &n, &zero, c, &n, 1, 1); break;
+    case DGESV:
+      FORTRAN(dgesv)(&n, &one, a, &n, pivots, b, &n, &info);
+      break;
+    case DSYSV:
+      FORTRAN(dsysv)("L", &n, &one, a, &n, pivots, b, &n, work, &lw, &info, 1);
+      break;
+    case DPOTRF:
+      FORTRAN(dpotrf)("L", &n, a, &n, &info, 1);
+      break;
+    case SPOTRF:
+      FORTRAN(spotrf)("L", &n, (float *)(void *)a, &n, &info, 1);
+      break;
+    case DGEMM:
+      FORTRAN(dgemm)("N", "N", &n, &n, &n, &plus, a, &n, a, &n, &zero, c, &n, 1, 1);
+      break;
   }
   time = batten_now() - start;
   if (info != 0) fprintf(stderr, "%s: info = %ld\n", bare_names[routine], (long)info);
@@ -180,8 +196,10 @@ static void table_of_size(batten_context *ctx, size_t n) {
   points s = make_points(n);
   size_t count = repeats(n);
   double sysv = time_bare(DSYSV, &s, count);
-  printf("\n### N = %zu\n\n| | total s | assemble | project | factor | solve | refinements | residual | rcond | MB |"
-         " / dsysv |\n|---|---|---|---|---|---|---|---|---|---|---|\n", n);
+  printf(
+      "\n### N = %zu\n\n| | total s | assemble | project | factor | solve | refinements | residual | rcond | MB |"
+      " / dsysv |\n|---|---|---|---|---|---|---|---|---|---|---|\n",
+      n);
   for (size_t q = 0; q < sizeof methods / sizeof *methods; q++) {
     if (methods[q] == BATTEN_SADDLE_QR && n > 2000) continue;
     run r = solve_median(ctx, &s, methods[q], count);
@@ -204,8 +222,9 @@ void openblas_set_num_threads(int threads) __attribute__((weak));
 
 static void table_400(void) {
   points s = make_points(396);
-  printf("\n### Table 1: a 400 x 400 system, 200 solutions\n\n| threads | method | ms each | use of processors |\n"
-         "|---|---|---|---|\n");
+  printf(
+      "\n### Table 1: a 400 x 400 system, 200 solutions\n\n| threads | method | ms each | use of processors |\n"
+      "|---|---|---|---|\n");
   for (unsigned threads = 1; threads <= 2; threads++) {
     batten_context_options o = batten_context_options_default();
     batten_context *ctx = NULL;
@@ -236,8 +255,8 @@ int main(int argc, char **argv) {
   batten_context *ctx = NULL;
   o.threads = batten_blas_threads() ? batten_blas_threads() : 1;
   if (batten_context_new(&o, &ctx) < 0) return 1;
-  printf("# Saddle solver, kernel -r in 3-D, k = 4\n\nBLAS: %s, %u threads; batten %s, %u threads; compiler %s\n", blas,
-         batten_blas_threads(), batten_version(), o.threads, __VERSION__);
+  printf("# Saddle solver, kernel -r in 3-D, k = 4\n\nBLAS: %s, %u threads; batten %s, %u threads; compiler %s\n",
+         blas, batten_blas_threads(), batten_version(), o.threads, __VERSION__);
   static const size_t usual[] = {1000, 2000, 4000};
   for (int q = 1; q < argc; q++) table_of_size(ctx, strtoul(argv[q], NULL, 10));
   for (size_t q = 0; argc == 1 && q < 3; q++) table_of_size(ctx, usual[q]);

@@ -24,7 +24,7 @@
 
 #include "base/checked.h"
 #include "basis/eigen3.h"
-#include "la/la_dense.h"
+#include "la/la.h"
 #include "orient_energy.h"
 
 enum { ROWS = 64 }; /* points to a task */

@@ -30,26 +30,29 @@ typedef int32_t batten_la_int;
 #define LEN size_t
 
 /* Level 2 and 3 BLAS, and Cholesky, in both precisions. */
-#define BATTEN_DECLARE_REAL(s, real)                                                                                   \
-  void FORTRAN(s##gemv)(CH trans, IN m, IN n, const real *alpha, const real *a, IN lda, const real *x, IN incx,        \
-                        const real *beta, real *y, IN incy, LEN);                                                      \
-  void FORTRAN(s##trsv)(CH uplo, CH trans, CH diag, IN n, const real *a, IN lda, real *x, IN incx, LEN, LEN, LEN);     \
-  void FORTRAN(s##gemm)(CH transa, CH transb, IN m, IN n, IN k, const real *alpha, const real *a, IN lda,              \
-                        const real *b, IN ldb, const real *beta, real *c, IN ldc, LEN, LEN);                           \
-  void FORTRAN(s##symm)(CH side, CH uplo, IN m, IN n, const real *alpha, const real *a, IN lda, const real *b, IN ldb, \
-                        const real *beta, real *c, IN ldc, LEN, LEN);                                                  \
-  void FORTRAN(s##syrk)(CH uplo, CH trans, IN n, IN k, const real *alpha, const real *a, IN lda, const real *beta,     \
-                        real *c, IN ldc, LEN, LEN);                                                                    \
-  void FORTRAN(s##syr2k)(CH uplo, CH trans, IN n, IN k, const real *alpha, const real *a, IN lda, const real *b,       \
-                         IN ldb, const real *beta, real *c, IN ldc, LEN, LEN);                                         \
-  void FORTRAN(s##trsm)(CH side, CH uplo, CH trans, CH diag, IN m, IN n, const real *alpha, const real *a, IN lda,     \
-                        real *b, IN ldb, LEN, LEN, LEN, LEN);                                                          \
-  void FORTRAN(s##potrf)(CH uplo, IN n, real *a, IN lda, OUT info, LEN);                                               \
-  void FORTRAN(s##pftrf)(CH transr, CH uplo, IN n, real *a, OUT info, LEN, LEN);                                       \
+#define BATTEN_DECLARE_REAL(s, real)                                                                               \
+  void FORTRAN(s##gemv)(CH trans, IN m, IN n, const real *alpha, const real *a, IN lda, const real *x, IN incx,    \
+                        const real *beta, real *y, IN incy, LEN);                                                  \
+  void FORTRAN(s##trsv)(CH uplo, CH trans, CH diag, IN n, const real *a, IN lda, real *x, IN incx, LEN, LEN, LEN); \
+  void FORTRAN(s##gemm)(CH transa, CH transb, IN m, IN n, IN k, const real *alpha, const real *a, IN lda,          \
+                        const real *b, IN ldb, const real *beta, real *c, IN ldc, LEN, LEN);                       \
+  void FORTRAN(s##symm)(CH side, CH uplo, IN m, IN n, const real *alpha, const real *a, IN lda, const real *b,     \
+                        IN ldb, const real *beta, real *c, IN ldc, LEN, LEN);                                      \
+  void FORTRAN(s##syrk)(CH uplo, CH trans, IN n, IN k, const real *alpha, const real *a, IN lda, const real *beta, \
+                        real *c, IN ldc, LEN, LEN);                                                                \
+  void FORTRAN(s##syr2k)(CH uplo, CH trans, IN n, IN k, const real *alpha, const real *a, IN lda, const real *b,   \
+                         IN ldb, const real *beta, real *c, IN ldc, LEN, LEN);                                     \
+  void FORTRAN(s##trsm)(CH side, CH uplo, CH trans, CH diag, IN m, IN n, const real *alpha, const real *a, IN lda, \
+                        real *b, IN ldb, LEN, LEN, LEN, LEN);                                                      \
+  void FORTRAN(s##potrf)(CH uplo, IN n, real * a, IN lda, OUT info, LEN);                                          \
+  void FORTRAN(s##pftrf)(CH transr, CH uplo, IN n, real * a, OUT info, LEN, LEN);                                  \
   void FORTRAN(s##pftrs)(CH transr, CH uplo, IN n, IN nrhs, const real *a, real *b, IN ldb, OUT info, LEN, LEN);
 BATTEN_DECLARE_REAL(d, double)
 BATTEN_DECLARE_REAL(s, float)
 #undef BATTEN_DECLARE_REAL
+
+void FORTRAN(dsymv)(CH uplo, IN n, const double *alpha, const double *a, IN lda, const double *x, IN incx,
+                    const double *beta, double *y, IN incy, LEN);
 
 /* LAPACK in double. */
 void FORTRAN(dpstrf)(CH uplo, IN n, double *a, IN lda, OUT piv, OUT rank, const double *tol, double *work, OUT info,

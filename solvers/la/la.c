@@ -30,19 +30,19 @@ bool batten_la_fits(size_t n) { return n <= (size_t)BATTEN_LA_INT_MAX; }
 /* ---- BLAS ---- */
 
 /* Calls name in the precision asked for; `body` sees `real_t` and the Fortran prefix through CALL. */
-#define IN_PRECISION(real, name, ...)                                 \
-  do {                                                                \
-    if ((real) == BATTEN_LA_DOUBLE) {                                 \
-      typedef double real_t;                                          \
-      const real_t a1 = alpha, b1 = beta;                             \
-      (void)a1, (void)b1;                                             \
-      FORTRAN(d##name)(__VA_ARGS__);                                  \
-    } else {                                                          \
-      typedef float real_t;                                           \
-      const real_t a1 = (float)alpha, b1 = (float)beta;               \
-      (void)a1, (void)b1;                                             \
-      FORTRAN(s##name)(__VA_ARGS__);                                  \
-    }                                                                 \
+#define IN_PRECISION(real, name, ...)                   \
+  do {                                                  \
+    if ((real) == BATTEN_LA_DOUBLE) {                   \
+      typedef double real_t;                            \
+      const real_t a1 = alpha, b1 = beta;               \
+      (void)a1, (void)b1;                               \
+      FORTRAN(d##name)(__VA_ARGS__);                    \
+    } else {                                            \
+      typedef float real_t;                             \
+      const real_t a1 = (float)alpha, b1 = (float)beta; \
+      (void)a1, (void)b1;                               \
+      FORTRAN(s##name)(__VA_ARGS__);                    \
+    }                                                   \
   } while (0)
 
 void batten_la_gemv(batten_la_real real, char trans, size_t m, size_t n, double alpha, const void *a, size_t lda,
@@ -51,6 +51,13 @@ void batten_la_gemv(batten_la_real real, char trans, size_t m, size_t n, double 
   batten_la_int mi = to_int(m), ni = to_int(n), la = to_ld(lda);
   IN_PRECISION(real, gemv, &trans, &mi, &ni, &a1, (const real_t *)a, &la, (const real_t *)x, &one, &b1, (real_t *)y,
                &one, 1);
+}
+
+void batten_la_symv(char uplo, size_t n, double alpha, const double *a, size_t lda, const double *x, double beta,
+                    double *y) {
+  if (n == 0) return;
+  batten_la_int ni = to_int(n), la = to_ld(lda);
+  FORTRAN(dsymv)(&uplo, &ni, &alpha, a, &la, x, &one, &beta, y, &one, 1);
 }
 
 void batten_la_trsv(batten_la_real real, char uplo, char trans, size_t n, const void *a, size_t lda, void *x) {

@@ -29,6 +29,8 @@ bool batten_la_fits(size_t n);
 /* BLAS. Arguments as in the Fortran routines; vectors have stride 1, triangles are not unit. */
 void batten_la_gemv(batten_la_real real, char trans, size_t m, size_t n, double alpha, const void *a, size_t lda,
                     const void *x, double beta, void *y);
+void batten_la_symv(char uplo, size_t n, double alpha, const double *a, size_t lda, const double *x, double beta,
+                    double *y);
 void batten_la_trsv(batten_la_real real, char uplo, char trans, size_t n, const void *a, size_t lda, void *x);
 void batten_la_gemm(batten_la_real real, char transa, char transb, size_t m, size_t n, size_t k, double alpha,
                     const void *a, size_t lda, const void *b, size_t ldb, double beta, void *c, size_t ldc);

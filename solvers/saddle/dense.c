@@ -53,7 +53,8 @@ size_t batten_saddle_dense_bytes(batten_saddle_method method, size_t n, size_t k
   return batten_add(bytes, extra, &bytes) ? bytes : SIZE_MAX;
 }
 
-/* After a factor with a zero on the diagonal: a pivot at rounding level lets inverse iteration find the null vector. */
+/* After a factor with a zero on the diagonal: a pivot at rounding level lets inverse iteration find the null vector.
+ */
 static void mend_zero(batten_saddle *s, size_t at, double norm) {
   s->a[at + at * batten_saddle_order(s)] = DBL_EPSILON * (norm > 0 ? norm : 1);
 }

@@ -65,8 +65,10 @@ batten_status batten_saddle_qr_new(batten_saddle *s) {
     for (size_t i = 0; i < k; i++) {
       bool upper = i <= c;
       qr->r[i + c * k] = upper ? qr->v[i + c * n] : 0;
-      if (upper) qr->v[i + c * n] = i == c;
-      else qr->t[i + c * k] = 0;
+      if (upper)
+        qr->v[i + c * n] = i == c;
+      else
+        qr->t[i + c * k] = 0;
     }
   st = check_rank(s);
 done:

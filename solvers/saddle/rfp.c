@@ -103,7 +103,8 @@ static size_t factor_high(const batten_rfp *b, size_t j, size_t width) {
   if (info > 0) return n1 + j + info;
   if (right == 0) return 0;
   void *rest = high(b, j, j + width);
-  batten_la_gemm(b->real, 'N', 'T', width, right, n1, -1, row, b->ld, low(b, n1 + j + width, 0), b->ld, 1, rest, b->ld);
+  batten_la_gemm(b->real, 'N', 'T', width, right, n1, -1, row, b->ld, low(b, n1 + j + width, 0), b->ld, 1, rest,
+                 b->ld);
   batten_la_gemm(b->real, 'T', 'N', width, right, j, -1, high(b, 0, j), b->ld, high(b, 0, j + width), b->ld, 1, rest,
                  b->ld);
   batten_la_trsm(b->real, 'L', 'U', 'T', width, right, 1, high(b, j, j), b->ld, rest, b->ld);

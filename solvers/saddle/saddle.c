@@ -12,23 +12,22 @@
 static const double STALL = 0.25;
 
 const char *batten_saddle_method_name(batten_saddle_method method) {
-  switch (method) {
-    case BATTEN_SADDLE_AUTO: return "auto";
-    case BATTEN_SADDLE_CHOLESKY: return "cholesky";
-    case BATTEN_SADDLE_CHOLESKY_MIXED: return "cholesky-mixed";
-    case BATTEN_SADDLE_LDL: return "ldl";
-    case BATTEN_SADDLE_QR: return "qr";
-  }
-  return "unknown method";
+  static const char *const names[] = {[BATTEN_SADDLE_AUTO] = "auto",
+                                      [BATTEN_SADDLE_CHOLESKY] = "cholesky",
+                                      [BATTEN_SADDLE_CHOLESKY_MIXED] = "cholesky-mixed",
+                                      [BATTEN_SADDLE_LDL] = "ldl",
+                                      [BATTEN_SADDLE_QR] = "qr"};
+  return (size_t)method < sizeof names / sizeof *names ? names[method] : "unknown method";
 }
 
 batten_saddle_options batten_saddle_options_default(void) {
-  return (batten_saddle_options){.struct_size = sizeof(batten_saddle_options), .refine_max = 10, .residual_tol = 1e-13};
+  return (batten_saddle_options){
+      .struct_size = sizeof(batten_saddle_options), .refine_max = 10, .residual_tol = 1e-13};
 }
 
 /* ---- Memory and choice of method ---- */
 
-/* From this order on the float factor saves more than the extra residuals cost (measured, benchmarks/bench_saddle). */
+/* From this order on the float factor saves more than the extra residuals cost (benchmarks/bench_saddle). */
 enum { MIXED_FROM = 1500 };
 
 static size_t qr_bytes(size_t n, size_t k) { return k * (n + 2 * k) * sizeof(double) + k * sizeof(size_t); }
@@ -42,8 +41,8 @@ size_t batten_saddle_bytes(batten_saddle_method method, size_t n, size_t k) {
   if (dense)
     bytes = batten_saddle_dense_bytes(method, n, k);
   else
-    bytes = batten_saddle_project_bytes(
-        method == BATTEN_SADDLE_CHOLESKY_MIXED ? BATTEN_LA_FLOAT : BATTEN_LA_DOUBLE, n, k);
+    bytes = batten_saddle_project_bytes(method == BATTEN_SADDLE_CHOLESKY_MIXED ? BATTEN_LA_FLOAT : BATTEN_LA_DOUBLE,
+                                        n, k);
   size_t fixed = handle_bytes(k) + (dense ? 0 : qr_bytes(n, k));
   return batten_add(bytes, fixed, &bytes) ? bytes : SIZE_MAX;
 }
@@ -69,21 +68,19 @@ static batten_saddle_method first_method(const batten_saddle *s) {
 }
 
 static batten_status too_large(const batten_saddle *s, batten_saddle_method method, const char *reason) {
-  return batten_fail(s->ctx, BATTEN_E_TOO_LARGE,
-                     "matrix.n: %zu rows by %s take %zu bytes, the context allows %zu%s%s; raise memory_limit or use fewer "
-                     "points%s",
-                     s->matrix.n, batten_saddle_method_name(method),
-                     batten_saddle_bytes(method, s->matrix.n, s->matrix.k), allowed_bytes(s), *reason ? ", since " : "", reason,
-                     method == BATTEN_SADDLE_CHOLESKY_MIXED || *reason ? "" : ", or method cholesky-mixed");
+  return batten_fail(
+      s->ctx, BATTEN_E_TOO_LARGE,
+      "matrix.n: %zu rows by %s take %zu bytes, the context allows %zu%s%s; raise memory_limit or use fewer "
+      "points%s",
+      s->matrix.n, batten_saddle_method_name(method), batten_saddle_bytes(method, s->matrix.n, s->matrix.k),
+      allowed_bytes(s), *reason ? ", since " : "", reason,
+      method == BATTEN_SADDLE_CHOLESKY_MIXED || *reason ? "" : ", or method cholesky-mixed");
 }
 
 /* The method to try after `method`; AUTO when there is none. */
 static batten_saddle_method next_method(batten_saddle_method method) {
-  switch (method) {
-    case BATTEN_SADDLE_CHOLESKY_MIXED: return BATTEN_SADDLE_CHOLESKY;
-    case BATTEN_SADDLE_CHOLESKY: return BATTEN_SADDLE_LDL;
-    default: return BATTEN_SADDLE_AUTO;
-  }
+  if (method == BATTEN_SADDLE_CHOLESKY_MIXED) return BATTEN_SADDLE_CHOLESKY;
+  return method == BATTEN_SADDLE_CHOLESKY ? BATTEN_SADDLE_LDL : BATTEN_SADDLE_AUTO;
 }
 
 /* ---- Factor ---- */
@@ -118,8 +115,10 @@ static batten_status factor_from(batten_saddle *s, batten_saddle_method method) 
     if (st != BATTEN_E_SINGULAR || next == BATTEN_SADDLE_AUTO) return st;
     if (!fits(s, next)) {
       if (method == BATTEN_SADDLE_CHOLESKY_MIXED) return too_large(s, next, batten_error(s->ctx));
-      return batten_fail(s->ctx, BATTEN_E_SINGULAR, "%s; merge duplicate points or check the kernel's sign (ldl, which "
-                         "could say more, does not fit)", batten_error(s->ctx));
+      return batten_fail(s->ctx, BATTEN_E_SINGULAR,
+                         "%s; merge duplicate points or check the kernel's sign (ldl, which "
+                         "could say more, does not fit)",
+                         batten_error(s->ctx));
     }
     s->info.fallbacks++;
     method = next;
@@ -133,13 +132,16 @@ static batten_status check_matrix(batten_context *ctx, const batten_saddle_matri
   if (!batten_add(m->n, m->k, &order) || !batten_la_fits(order))
     return batten_fail(ctx, BATTEN_E_TOO_LARGE, "matrix.n: %zu + %zu rows exceed LAPACK's integers", m->n, m->k);
   if (m->k >= m->n && m->k > 0)
-    return batten_fail(ctx, BATTEN_E_INVALID, "matrix.k: %zu columns of P need more than %zu rows; add points or lower "
-                       "the polynomial degree", m->k, m->n);
+    return batten_fail(ctx, BATTEN_E_INVALID,
+                       "matrix.k: %zu columns of P need more than %zu rows; add points or lower "
+                       "the polynomial degree",
+                       m->k, m->n);
   if (m->k > 0 && !m->p) return batten_fail(ctx, BATTEN_E_INVALID, "matrix.p: NULL with k = %zu", m->k);
   if (m->n > 0 && !m->fill) return batten_fail(ctx, BATTEN_E_INVALID, "matrix.fill: NULL; give a callback");
   size_t bad = batten_first_nonfinite(m->n * m->k, m->p);
   if (bad < m->n * m->k)
-    return batten_fail(ctx, BATTEN_E_INVALID, "matrix.p[%zu][%zu]: %g is not finite", bad / m->n, bad % m->n, m->p[bad]);
+    return batten_fail(ctx, BATTEN_E_INVALID, "matrix.p[%zu][%zu]: %g is not finite", bad / m->n, bad % m->n,
+                       m->p[bad]);
   return BATTEN_OK;
 }
 
@@ -190,8 +192,10 @@ batten_status batten_saddle_factor(batten_context *ctx, const batten_saddle_matr
   if (st < 0) goto done;
   st = factor_from(s, method);
 done:
-  if (st < 0) batten_saddle_free(s);
-  else *out = s;
+  if (st < 0)
+    batten_saddle_free(s);
+  else
+    *out = s;
   return st;
 }
 
@@ -322,8 +326,9 @@ batten_status batten_saddle_solve(batten_context *ctx, batten_saddle *s, const d
   if (k > 0) memcpy(c, best + n, k * sizeof *c);
   s->info.time_solve_s = batten_now() - start;
   if (s->info.residual > s->options.residual_tol)
-    st = batten_fail(ctx, BATTEN_W_ACCURACY, "residual: %.3g after %u refinements, above the tolerance %.3g; rcond %.3g",
-                     s->info.residual, s->info.refinements, s->options.residual_tol, s->info.rcond);
+    st = batten_fail(ctx, BATTEN_W_ACCURACY,
+                     "residual: %.3g after %u refinements, above the tolerance %.3g; rcond %.3g", s->info.residual,
+                     s->info.refinements, s->options.residual_tol, s->info.rcond);
 done:
   batten_free(ctx, x);
   return st;
@@ -354,7 +359,8 @@ batten_status batten_saddle_inverse_diagonal(batten_context *ctx, batten_saddle 
     return batten_fail(ctx, BATTEN_E_INVALID, "%s: NULL", index ? "diagonal" : "index");
   size_t n = s->matrix.n;
   for (size_t q = 0; q < count; q++)
-    if (index[q] >= n) return batten_fail(ctx, BATTEN_E_INVALID, "index[%zu]: %zu; must be below %zu", q, index[q], n);
+    if (index[q] >= n)
+      return batten_fail(ctx, BATTEN_E_INVALID, "index[%zu]: %zu; must be below %zu", q, index[q], n);
 
   double *result = batten_alloc_array(ctx, count, sizeof *result);
   if (!result) return BATTEN_E_NOMEM;

@@ -69,8 +69,8 @@ typedef struct batten_saddle_tile {
 size_t batten_saddle_walk_bytes(size_t n);
 
 /* Calls sink(arg, worker, tile) for each tile of the lower triangle of K, once, from several threads; which tiles a
- * worker gets, in which order, depends on n and the breaks alone. No tile straddles a break (breaks[0] <= breaks[1]); tiles with col0 >= breaks[1] come across. With
- * check, entries that are not finite are refused. */
+ * worker gets, in which order, depends on n and the breaks alone. No tile straddles a break (breaks[0] <= breaks[1]);
+ * tiles with col0 >= breaks[1] come across. With check, entries that are not finite are refused. */
 batten_status batten_saddle_walk(const batten_saddle *s, const char *phase, const size_t breaks[2], bool check,
                                  void (*sink)(void *arg, size_t worker, const batten_saddle_tile *tile), void *arg);
 

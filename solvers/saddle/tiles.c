@@ -2,7 +2,8 @@
  *
  * The triangle is cut into tiles of 128 x 128, numbered row by row; worker w takes the tiles w, w + 16, ... of each
  * portion, so what a worker does and adds up is fixed by the sizes alone and no bit depends on the thread count.
- * Tiles live in per-worker scratch (128 KB, inside the second level cache) and are copied or multiplied from there. */
+ * Tiles live in per-worker scratch (128 KB, inside the second level cache) and are copied or multiplied from there.
+ */
 #include <float.h>
 #include <string.h>
 
@@ -17,8 +18,8 @@ enum {
 
 /* The rows of K cut into blocks that do not straddle the breaks. */
 typedef struct partition {
-  size_t bounds[4];  /* 0, breaks, n */
-  size_t before[4];  /* blocks before each bound */
+  size_t bounds[4]; /* 0, breaks, n */
+  size_t before[4]; /* blocks before each bound */
 } partition;
 
 static partition make_partition(size_t n, const size_t breaks[2]) {
@@ -109,8 +110,8 @@ batten_status batten_saddle_walk(const batten_saddle *s, const char *phase, cons
                                  void (*sink)(void *arg, size_t worker, const batten_saddle_tile *tile), void *arg) {
   batten_context *ctx = s->ctx;
   batten_status st = BATTEN_OK;
-  walk w = {.matrix = &s->matrix, .blocks = make_partition(s->matrix.n, breaks), .check = check, .sink = sink,
-            .arg = arg};
+  walk w = {
+      .matrix = &s->matrix, .blocks = make_partition(s->matrix.n, breaks), .check = check, .sink = sink, .arg = arg};
   size_t tiles = w.blocks.before[3] * (w.blocks.before[3] + 1) / 2;
   w.scratch = batten_alloc(ctx, batten_saddle_walk_bytes(s->matrix.n));
   if (!w.scratch) return BATTEN_E_NOMEM;

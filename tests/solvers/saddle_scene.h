@@ -12,11 +12,11 @@ static const char *const kernel_names[] = {"-r", "r^3", "r^2 ln r"};
 typedef struct scene {
   size_t n, k;
   scene_kernel kernel;
-  double nugget;   /* added to the diagonal */
-  double factor;   /* multiplies K */
-  double *x;       /* [n][3] */
-  double *p;       /* [k][n] */
-  double *f;       /* [n] */
+  double nugget; /* added to the diagonal */
+  double factor; /* multiplies K */
+  double *x;     /* [n][3] */
+  double *p;     /* [k][n] */
+  double *f;     /* [n] */
 } scene;
 
 static inline double scene_phi(scene_kernel kernel, double r2) {
@@ -38,11 +38,18 @@ static inline void scene_fill(const void *user, size_t row0, size_t rows, size_t
 }
 
 typedef enum scene_type {
-  SCENE_RANDOM, SCENE_GRID, SCENE_SPHERE, SCENE_NEAR_DUPLICATES, SCENE_CLUSTERS, SCENE_TINY, SCENE_HUGE,
-  SCENE_TRANSLATED, SCENE_TYPES
+  SCENE_RANDOM,
+  SCENE_GRID,
+  SCENE_SPHERE,
+  SCENE_NEAR_DUPLICATES,
+  SCENE_CLUSTERS,
+  SCENE_TINY,
+  SCENE_HUGE,
+  SCENE_TRANSLATED,
+  SCENE_TYPES
 } scene_type;
-static const char *const scene_names[] = {"random", "grid", "sphere", "near-duplicates", "clusters", "scale 1e-6",
-                                          "scale 1e6", "translated"};
+static const char *const scene_names[] = {"random",   "grid",       "sphere",    "near-duplicates",
+                                          "clusters", "scale 1e-6", "scale 1e6", "translated"};
 
 static inline void scene_points(scene_type type, size_t n, uint64_t *seed, double *x) {
   size_t side = (size_t)ceil(cbrt((double)n));
@@ -72,7 +79,8 @@ static inline void scene_points(scene_type type, size_t n, uint64_t *seed, doubl
       case SCENE_TRANSLATED:
         for (int d = 0; d < 3; d++) p[d] += 100 * (d + 1);
         break;
-      default: break;
+      default:
+        break;
     }
   }
 }
@@ -103,8 +111,8 @@ static inline batten_saddle_matrix scene_matrix(const scene *s) {
 
 /* How well (w, c) solves the scene, computed in the plainest way. */
 typedef struct scene_quality {
-  double residual;      /* max |f - K w - P c| / max |f| */
-  double scaled;        /* max |f - K w - P c| / (eps max(|f| + |K||w| + |P||c|)): rounding of w alone gives about 1 */
+  double residual; /* max |f - K w - P c| / max |f| */
+  double scaled;   /* max |f - K w - P c| / (eps max(|f| + |K||w| + |P||c|)): rounding of w alone gives about 1 */
   double orthogonality; /* max |P' w| / (max|P| |w|_1) */
 } scene_quality;
 

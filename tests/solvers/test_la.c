@@ -13,8 +13,10 @@ static double *make_matrix(size_t n, uint64_t seed) {
 }
 
 static void set(batten_la_real real, void *at, double value) {
-  if (real == BATTEN_LA_DOUBLE) *(double *)at = value;
-  else *(float *)at = (float)value;
+  if (real == BATTEN_LA_DOUBLE)
+    *(double *)at = value;
+  else
+    *(float *)at = (float)value;
 }
 static double get(batten_la_real real, const void *at) {
   return real == BATTEN_LA_DOUBLE ? *(const double *)at : (double)*(const float *)at;

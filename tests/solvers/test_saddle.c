@@ -1,8 +1,8 @@
 /* Saddle systems: solutions by hand, residuals over sizes and kinds of point sets, second routes, invariances. */
 #include "saddle_scene.h"
 
-static const batten_saddle_method methods[] = {BATTEN_SADDLE_AUTO, BATTEN_SADDLE_CHOLESKY, BATTEN_SADDLE_CHOLESKY_MIXED,
-                                               BATTEN_SADDLE_LDL, BATTEN_SADDLE_QR};
+static const batten_saddle_method methods[] = {BATTEN_SADDLE_AUTO, BATTEN_SADDLE_CHOLESKY,
+                                               BATTEN_SADDLE_CHOLESKY_MIXED, BATTEN_SADDLE_LDL, BATTEN_SADDLE_QR};
 enum { METHODS = sizeof methods / sizeof *methods, MOST = 1000 };
 
 /* Solves; returns the status of the first call that failed, or of the solve. info may be NULL. */
@@ -93,8 +93,10 @@ static void test_residuals(batten_context *ctx) {
           ok = ok && st >= 0;
           scene_quality quality = scene_check(&s, w, c);
           residual = fmax(residual, quality.residual);
-          if (st == BATTEN_W_ACCURACY) scaled = fmax(scaled, quality.scaled);
-          else met = fmax(met, quality.residual);
+          if (st == BATTEN_W_ACCURACY)
+            scaled = fmax(scaled, quality.scaled);
+          else
+            met = fmax(met, quality.residual);
           orthogonality = fmax(orthogonality, quality.orthogonality);
           scene_free(&s);
         }
@@ -116,9 +118,10 @@ static void test_second_routes(batten_context *ctx) {
     for (int q = 0; q < METHODS; q++) {
       batten_saddle_info info = {0};
       batten_status st = solve_scene(ctx, &s, methods[q], other, other_c, &info);
-      T_CHECK(st >= 0 && info.rcond > 0 && info.rcond <= 1, "%s by %s: used %s, %u refinements, residual %.2g, rcond %.2g",
-              kernel_names[kernel], batten_saddle_method_name(methods[q]), batten_saddle_method_name(info.method),
-              info.refinements, info.residual, info.rcond);
+      T_CHECK(st >= 0 && info.rcond > 0 && info.rcond <= 1,
+              "%s by %s: used %s, %u refinements, residual %.2g, rcond %.2g", kernel_names[kernel],
+              batten_saddle_method_name(methods[q]), batten_saddle_method_name(info.method), info.refinements,
+              info.residual, info.rcond);
       T_RATIO(difference(s.n, w, other), 1e-9, "its w against LDL'");
       T_RATIO(difference(4, c, other_c), 1e-9, "its c against LDL'");
     }

@@ -8,8 +8,10 @@
 
 static int fail_float, fail_double, fail_ldl;
 
-typedef void potrf_double(const char *, const batten_la_int *, double *, const batten_la_int *, batten_la_int *, size_t);
-typedef void potrf_float(const char *, const batten_la_int *, float *, const batten_la_int *, batten_la_int *, size_t);
+typedef void potrf_double(const char *, const batten_la_int *, double *, const batten_la_int *, batten_la_int *,
+                          size_t);
+typedef void potrf_float(const char *, const batten_la_int *, float *, const batten_la_int *, batten_la_int *,
+                         size_t);
 typedef void sytrf_double(const char *, const batten_la_int *, double *, const batten_la_int *, batten_la_int *,
                           double *, const batten_la_int *, batten_la_int *, size_t);
 
@@ -53,8 +55,8 @@ static void check(batten_context *ctx, batten_saddle_method method, batten_saddl
   T_OK(batten_saddle_factor(ctx, &m, &o, &h), ctx);
   T_OK(batten_saddle_solve(ctx, h, s.f, w, c), ctx);
   batten_saddle_info info = batten_saddle_get_info(h);
-  T_CHECK(info.method == used && info.fallbacks == fallbacks, "%s ends with %s after %u", batten_saddle_method_name(method),
-          batten_saddle_method_name(info.method), info.fallbacks);
+  T_CHECK(info.method == used && info.fallbacks == fallbacks, "%s ends with %s after %u",
+          batten_saddle_method_name(method), batten_saddle_method_name(info.method), info.fallbacks);
   T_RATIO(scene_check(&s, w, c).residual, 1.5e-13, "its residual");
   batten_saddle_free(h);
   scene_free(&s);

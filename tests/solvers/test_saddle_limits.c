@@ -29,7 +29,8 @@ static void test_names(void) {
   static const char *const names[] = {"auto", "cholesky", "cholesky-mixed", "ldl", "qr"};
   for (int q = 0; q < 5; q++)
     T_CHECK(!strcmp(batten_saddle_method_name((batten_saddle_method)q), names[q]), "name %s", names[q]);
-  T_CHECK(!strcmp(batten_saddle_method_name((batten_saddle_method)9), "unknown method"), "name of a method that is none");
+  T_CHECK(!strcmp(batten_saddle_method_name((batten_saddle_method)9), "unknown method"),
+          "name of a method that is none");
 }
 
 static void test_arguments(batten_context *ctx) {
@@ -56,7 +57,8 @@ static void test_arguments(batten_context *ctx) {
   T_STATUS(factor(ctx, &m, BATTEN_SADDLE_AUTO), BATTEN_E_INVALID, ctx, "matrix.fill: NULL");
   m = good;
   m.n = 4;
-  T_STATUS(factor(ctx, &m, BATTEN_SADDLE_AUTO), BATTEN_E_INVALID, ctx, "matrix.k: 4 columns of P need more than 4 rows");
+  T_STATUS(factor(ctx, &m, BATTEN_SADDLE_AUTO), BATTEN_E_INVALID, ctx,
+           "matrix.k: 4 columns of P need more than 4 rows");
   m.n = 0;
   T_STATUS(factor(ctx, &m, BATTEN_SADDLE_AUTO), BATTEN_E_INVALID, ctx, "matrix.k: 4");
   for (int q = 0; q < 3; q++) {
@@ -155,8 +157,8 @@ static void test_fallback(batten_context *ctx) {
     T_OK(batten_saddle_solve(ctx, h, s.f, w, c), ctx);
     batten_saddle_info info = batten_saddle_get_info(h);
     T_CHECK(info.method == BATTEN_SADDLE_LDL && info.fallbacks == (method == BATTEN_SADDLE_CHOLESKY_MIXED ? 2 : 1),
-            "indefinite by %s: %s after %u", batten_saddle_method_name(o.method), batten_saddle_method_name(info.method),
-            info.fallbacks);
+            "indefinite by %s: %s after %u", batten_saddle_method_name(o.method),
+            batten_saddle_method_name(info.method), info.fallbacks);
     T_RATIO(scene_check(&s, w, c).residual, 1.5e-13, "its residual");
     batten_saddle_free(h);
   }
@@ -169,8 +171,8 @@ static void test_fallback(batten_context *ctx) {
   o.method = BATTEN_SADDLE_CHOLESKY_MIXED;
   batten_status st = batten_saddle_factor(ctx, &m, &o, &h);
   batten_saddle_info info = st >= 0 ? batten_saddle_get_info(h) : (batten_saddle_info){0};
-  T_CHECK(info.method == BATTEN_SADDLE_CHOLESKY && info.fallbacks == 1, "r^3 on a sphere falls from mixed to %s, rcond %.2g",
-          batten_saddle_method_name(info.method), info.rcond);
+  T_CHECK(info.method == BATTEN_SADDLE_CHOLESKY && info.fallbacks == 1,
+          "r^3 on a sphere falls from mixed to %s, rcond %.2g", batten_saddle_method_name(info.method), info.rcond);
   /* A tolerance that no double can meet is told, with the best solution. */
   o.residual_tol = 1e-30;
   batten_saddle_free(h);
@@ -207,8 +209,10 @@ static void test_stall(void) {
       T_STATUS(batten_saddle_solve(ctx, h, s.f, w, c), BATTEN_W_ACCURACY, ctx, "above the tolerance");
     }
     batten_saddle_info info = batten_saddle_get_info(h);
-    T_CHECK(info.method == (room ? BATTEN_SADDLE_CHOLESKY : BATTEN_SADDLE_CHOLESKY_MIXED) && (int)info.fallbacks == room,
-            "%s after %u fall-backs, residual %.2g", batten_saddle_method_name(info.method), info.fallbacks, info.residual);
+    T_CHECK(
+        info.method == (room ? BATTEN_SADDLE_CHOLESKY : BATTEN_SADDLE_CHOLESKY_MIXED) && (int)info.fallbacks == room,
+        "%s after %u fall-backs, residual %.2g", batten_saddle_method_name(info.method), info.fallbacks,
+        info.residual);
     batten_saddle_free(h);
     T_CHECK(batten_bytes_in_use(ctx) == 0, "all memory is given back");
     batten_context_free(ctx);
@@ -334,8 +338,8 @@ static void test_accepted(void) {
     } else {
       T_STATUS(factor(ctx, &m, (batten_saddle_method)method), BATTEN_E_NOMEM, ctx, "out of memory");
       size_t packed = (size_t)59996 * 59997 / 2 * (method == BATTEN_SADDLE_CHOLESKY ? 8 : 4);
-      T_CHECK(memory.largest >= packed && memory.largest < packed + 1000, "N = 60,000 is accepted: %zu bytes asked for",
-              memory.largest);
+      T_CHECK(memory.largest >= packed && memory.largest < packed + 1000,
+              "N = 60,000 is accepted: %zu bytes asked for", memory.largest);
     }
     batten_context_free(ctx);
   }
