@@ -87,28 +87,35 @@ static batten_status check(batten_context *ctx, unsigned n, size_t count, const 
   return BATTEN_OK;
 }
 
-/* At most `most` points, each the farthest from those before it, the first the farthest from the centroid; none
- * twice. chosen [most], distance [count] of work. Returns how many. */
-static size_t spread(unsigned n, size_t count, const double *points, size_t most, size_t *chosen, double *distance) {
-  size_t found = 0;
-  for (size_t i = 0; i < count; i++) distance[i] = INFINITY;
-  const double *from = (const double[3]){0};
-  while (found <= most) {
+/* At most *found points, each the farthest from those before it, the first the farthest from the centroid; none
+ * twice. chosen [*found], distance [count] of work. *found becomes how many there are. */
+static batten_status spread(batten_context *ctx, unsigned n, size_t count, const double *points, size_t *found,
+                            size_t *chosen, double *distance) {
+  size_t most = *found, first = 0;
+  double far = -1;
+  for (size_t i = 0; i < count; i++) {
+    double square = 0;
+    for (unsigned c = 0; c < n; c++) square += points[i * n + c] * points[i * n + c];
+    if (square > far) far = square, first = i;
+    distance[i] = INFINITY;
+  }
+  chosen[0] = first;
+  for (*found = 1; *found < most; ++*found) {
+    const double *last = points + chosen[*found - 1] * n;
     size_t next = 0;
-    double far = -1;
+    far = -1;
     for (size_t i = 0; i < count; i++) {
       double square = 0;
-      for (unsigned c = 0; c < n; c++) square += (points[i * n + c] - from[c]) * (points[i * n + c] - from[c]);
-      if (found == 0 || square < distance[i]) distance[i] = square;
+      for (unsigned c = 0; c < n; c++) square += (points[i * n + c] - last[c]) * (points[i * n + c] - last[c]);
+      if (square < distance[i]) distance[i] = square;
       if (distance[i] > far) far = distance[i], next = i;
     }
-    if (found == 0) /* the centroid was only for the first */
-      for (size_t i = 0; i < count; i++) distance[i] = INFINITY;
-    if (found == most || far <= SAME * SAME) break;
-    chosen[found++] = next;
-    from = points + next * n;
+    if (far <= SAME * SAME) break;
+    chosen[*found] = next;
+    batten_status status = *found % 64 ? BATTEN_OK : batten_progress(ctx, "orient", 0);
+    if (status < 0) return status;
   }
-  return found;
+  return BATTEN_OK;
 }
 
 /* Directions from the planes where they are sure, signs from the field's gradients. */
@@ -142,7 +149,8 @@ static batten_status orient_subset(batten_context *ctx, const batten_orient_grap
       !(points = batten_alloc_array(ctx, most, n * sizeof *points)) ||
       !(some = batten_alloc_array(ctx, most, n * sizeof *some)))
     goto done;
-  size_t found = spread(n, graph->count, graph->points, most, chosen, gradients);
+  size_t found = most;
+  if ((status = spread(ctx, n, graph->count, graph->points, &found, chosen, gradients)) < 0) goto done;
   if (found < n + 2) {
     status = batten_fail(ctx, BATTEN_E_INVALID, "points: %zu different ones; %u or more are needed", found, n + 2);
     goto done;
