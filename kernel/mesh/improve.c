@@ -16,7 +16,8 @@
 
 static const double LONG_EDGE = 4.0 / 3, SHORT_EDGE = 4.0 / 5; /* the paper's bounds: a split makes no short edge */
 static const double SMOOTHING = 0.7;                           /* of the way to the neighbours' mean */
-static const double STEP_MAX = 0.3;                            /* Newton step, in edges */
+static const double REACH = 1.5;       /* of the last search for f = 0, in edges: more than a cube of the lattice */
+static const double STEP_MAX = 0.3;    /* Newton step, in edges */
 static const double TURN_MIN = 0.5;    /* cosine between a triangle's normals before and after a change */
 static const double FACE_MIN = 0.2;    /* cosine between its normal and its corners' gradients */
 static const double QUALITY_MIN = 0.3; /* changes make no triangle worse than this, unless it was worse before */
@@ -26,6 +27,7 @@ enum { FLIP_SWEEPS = 4, VALENCE_MAX = 12 };
 typedef struct improver {
   batten_surface *s;
   batten_sampler *sampler;
+  const double *lower, *upper; /* the box */
   double edge;
   double *target, *values, *gradients; /* [V][3], [V], [V][3] */
   size_t room;                         /* vertices that they hold */
@@ -235,6 +237,12 @@ static batten_status make_room(improver *im) {
   return BATTEN_OK;
 }
 
+static bool in_box(const improver *im, const double *x) {
+  for (int k = 0; k < 3; k++)
+    if (!(x[k] >= im->lower[k] && x[k] <= im->upper[k])) return false;
+  return true;
+}
+
 /* One pass over all vertices of the compacted surface; on_field: back to f = 0 after the move along the surface. */
 static batten_status smooth(improver *im, bool on_field) {
   batten_surface *s = im->s;
@@ -249,7 +257,7 @@ static batten_status smooth(improver *im, bool on_field) {
     if (on_field)
       batten_newton_step(3, im->values[v], im->gradients + 3 * (size_t)v, s->faces[v], STEP_MAX * im->edge, x, n);
     for (int attempt = 0; attempt < 3; attempt++) { /* all of the way, half, a quarter */
-      if (ring_allows(im, v, MESH_NONE, x, n)) {
+      if (in_box(im, x) && ring_allows(im, v, MESH_NONE, x, n)) {
         memcpy(point(s, v), x, sizeof n);
         memcpy(normal(s, v), n, sizeof n);
         break;
@@ -260,8 +268,9 @@ static batten_status smooth(improver *im, bool on_field) {
   return BATTEN_OK;
 }
 
-batten_status batten_surface_improve(batten_surface *s, batten_sampler *sampler, double edge, unsigned rounds) {
-  improver im = {.s = s, .sampler = sampler, .edge = edge};
+batten_status batten_surface_improve(batten_surface *s, batten_sampler *sampler, const double *lower,
+                                     const double *upper, double edge, unsigned rounds) {
+  improver im = {.s = s, .sampler = sampler, .lower = lower, .upper = upper, .edge = edge};
   batten_status st = BATTEN_OK;
   for (unsigned round = 0; st >= 0 && round < rounds; round++) {
     st = batten_progress(s->ctx, "improve", (double)round / rounds);
@@ -285,8 +294,8 @@ batten_status batten_surface_settle(batten_surface *s, batten_sampler *sampler, 
                                     double *distance_max) {
   double *distance = batten_alloc_array(s->ctx, s->vertex_count, sizeof *distance), worst = 0;
   if (!distance) return BATTEN_E_NOMEM;
-  batten_status st =
-      batten_project_points(sampler, s->vertex_count, s->points, s->faces, edge, tolerance, s->normals, distance);
+  batten_status st = batten_project_points(sampler, s->vertex_count, s->points, s->faces, REACH * edge, tolerance,
+                                           s->normals, distance);
   for (size_t v = 0; st >= 0 && v < s->vertex_count; v++) worst = fmax(worst, distance[v]);
   if (st >= 0) *distance_max = worst;
   batten_free(s->ctx, distance);

@@ -187,7 +187,7 @@ static batten_status attempt(batten_sampler *sampler, const batten_frame *frame,
   info->clipped = 0;
   for (size_t v = 0; v < rough.vertex_count; v++) info->clipped = info->clipped || rough.faces[v];
   st = batten_surface_build(sampler->ctx, &rough, surface);
-  if (st >= 0) st = batten_surface_improve(surface, sampler, edge, opt->improve);
+  if (st >= 0) st = batten_surface_improve(surface, sampler, frame->lower, frame->upper, edge, opt->improve);
   if (st >= 0)
     st = batten_surface_settle(surface, sampler, edge, opt->accuracy * frame->diagonal, &info->distance_max);
   if (st >= 0)
