@@ -38,6 +38,11 @@ cat "$@" | tr '\n' ' ' | sed 's/BATTEN_API/\n&/g' | sed -n 's/^BATTEN_API [^(]*\
   sort -u >"$scratch/declared"
 comm -23 "$scratch/exported" "$scratch/declared" >"$scratch/lines"
 empty "every exported name is declared in a public header"
+comm -13 "$scratch/exported" "$scratch/declared" >"$scratch/lines"
+empty "every declared name is exported"
+
+sort -u "$list" | comm -3 - "$scratch/exported" >"$scratch/lines"
+empty "exports are those of $(basename "$list") (left: only in the list; right: only in the library)"
 
 # Ends the process, prints, reads the environment, or changes what belongs to the host.
 nm -D --undefined-only "$library" | awk '{ sub(/@.*/, "", $2); print $2 }' |
