@@ -263,8 +263,8 @@ static size_t cell_of(const check_grid *g, const double *x) {
   return at[0] + g->nodes[0] * (at[1] + g->nodes[1] * at[2]);
 }
 
-/* Gaps from the nearest point beyond which no f = 0 is due, by dimension. A contour passes half a gap from a point, and
- * bulges. Of points scattered at random on a surface the widest hole has 1.7 mean spacings to its rim (N = 1000);
+/* Gaps from the nearest point beyond which no f = 0 is due, by dimension. A contour passes half a gap from a point,
+ * and bulges. Of points scattered at random on a surface the widest hole has 1.7 mean spacings to its rim (N = 1000);
  * measured on spheres and bodies of 60 to 1000 points: with 2.5, 3 cells at most of some 5000 are beyond. */
 static const double REACH[3] = {1, 1, 2.5};
 

@@ -31,7 +31,8 @@ typedef struct fit_state {
   batten_carrier *carrier; /* owned; NULL until somebody needs it */
   double *normals;         /* that are in use; owned when estimated */
   batten_orientation_used orientation;
-  attempt best; /* so far */
+  attempt best;       /* so far */
+  bool carrier_tried; /* the first attempt was with the carrier alone */
   batten_solid_info info;
 } fit_state;
 
@@ -227,6 +228,7 @@ static size_t complaints(const batten_sign_check *c) {
 
 static bool is_better(const attempt *a, const attempt *b) {
   if (!b->solid || is_good(a)) return true;
+  if (is_good(b)) return false;
   if (a->check.clean != b->check.clean) return a->check.clean;
   size_t of_a = complaints(&a->check), of_b = complaints(&b->check);
   return of_a < of_b || (of_a == of_b && a->spline.residual_max < b->spline.residual_max);
@@ -283,7 +285,8 @@ static batten_status cure(fit_state *f) {
     kinds[1] = small ? BATTEN_ORIENT_DATA_PAIRS : BATTEN_ORIENT_DATA_GRADIENTS;
   }
   batten_status st = orient(f);
-  for (int k = 0; st >= 0 && k < 2 && !is_good(&f->best); k++) {
+  for (int k = 0; st >= 0 && k < 2; k++) {
+    if (is_good(&f->best) && f->best.data != BATTEN_ORIENT_DATA_AUTO) break;
     if (k == 1 && kinds[1] == kinds[0]) break;
     attempt next = {0};
     st = try_oriented(f, kinds[k], &next);
@@ -335,7 +338,7 @@ static batten_status finish(fit_state *f) {
   batten_status st = measure_residual(f);
   if (st < 0) return st;
   batten_solid_info *info = &f->info;
-  bool oriented = f->best.data != BATTEN_ORIENT_DATA_AUTO;
+  bool oriented = f->best.data != BATTEN_ORIENT_DATA_AUTO, first_was_left = oriented && f->carrier_tried;
   info->points_given = f->data.given;
   info->points_used = f->data.count;
   info->duplicates_merged = f->data.given - f->data.count;
@@ -348,9 +351,7 @@ static batten_status finish(fit_state *f) {
   info->check_final = f->best.check;
   info->spline = f->best.spline;
   info->spacing = f->data.spacing_median;
-  info->sign = !f->best.check.clean ? BATTEN_SIGN_AMBIGUOUS
-               : !info->check.clean ? BATTEN_SIGN_CURED
-                                    : BATTEN_SIGN_CLEAN;
+  info->sign = !f->best.check.clean ? BATTEN_SIGN_AMBIGUOUS : first_was_left ? BATTEN_SIGN_CURED : BATTEN_SIGN_CLEAN;
   if (!f->best.check.clean) return ambiguous(f);
   /* The saddle solver's tolerance is for its equations; here counts how near f comes to 0, or, where smoothing keeps
    * it away, the spline to what it aims at. */
@@ -371,6 +372,13 @@ static bool orientation_comes_first(const fit_state *f) {
   /* AUTO: what the carrier cannot do, and nobody asked it to do by name, or normals are there */
   bool reproduced = o->carrier ? kind_is_reproduced(o->carrier, o->spline.m) : o->spline.m >= 3;
   return reproduced && (!o->carrier || f->data.normals);
+}
+
+/* Whether the carrier's fit should not be left alone: the check says so, or most points lie in lines (planar cuts,
+ * scan lines). Between these the carrier alone makes necks and bridges that no check of sheets far from data can see.
+ */
+static bool wants_orientation(const fit_state *f) {
+  return !f->best.check.clean || 2 * f->data.in_lines > f->data.count;
 }
 
 static void release(fit_state *f) {
@@ -398,9 +406,10 @@ batten_status batten_solid_fit(batten_context *ctx, unsigned n, size_t count, co
     st = cure(&f);
     if (st >= 0) f.info.check = f.best.check;
   } else {
+    f.carrier_tried = true;
     st = try_carrier(&f, &f.best);
     if (st >= 0) f.info.check = f.best.check;
-    if (st >= 0 && !f.best.check.clean && f.opt.orientation == BATTEN_ORIENT_AUTO) st = cure(&f);
+    if (st >= 0 && f.opt.orientation == BATTEN_ORIENT_AUTO && wants_orientation(&f)) st = cure(&f);
   }
   if (st >= 0) st = finish(&f);
   if (st < 0) goto done;

@@ -32,6 +32,7 @@ typedef struct surface_data {
   double *smoothing;     /* [count], NULL = the same for all */
   double *spacing;       /* [count] local distance between neighbours on the surface */
   double *gap;           /* [count] >= spacing: how far the surface may go without data, about */
+  size_t in_lines;       /* points of a surface in lines that lie farther apart than 3 of their spacings */
   double spacing_median; /* of the distances to the nearest */
   double lower[3], upper[3], middle[3], radius; /* box, and the ball about it */
   batten_tree *tree;

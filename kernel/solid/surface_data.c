@@ -130,8 +130,23 @@ static double gap_of_contour(const surface_data *d, size_t i, size_t *near, doub
   }
 }
 
-/* gap: how far the surface may be expected to go on without data. In space the spacing, or the largest gap between
- * lines at a point and its neighbours (where lines cross, the points of the crossing know of none). */
+/* Each value becomes the largest among the point's neighbours and its own. */
+static void spread(size_t count, size_t k, const size_t *index, double *values, double *scratch) {
+  for (size_t i = 0; i < count; i++) {
+    scratch[i] = values[i];
+    for (size_t j = 0; j < k; j++) scratch[i] = fmax(scratch[i], values[index[i * k + j]]);
+  }
+  memcpy(values, scratch, count * sizeof *values);
+}
+
+/* What a gap between lines counts as, so that the sign check asks from 1.25 of it on: the middle is half a gap away.
+ */
+static const double LINE_GAP = 0.5;
+/* Where lines cross, the points of the crossing know of no gap: they learn it from neighbours of neighbours. */
+enum { ROUNDS = 3 };
+
+/* gap: how far the surface may be expected to go on without data. In space the spacing, or what is left
+ * free between lines about a point. */
 static batten_status measure_gaps(batten_context *ctx, surface_data *d, size_t k, const size_t *index) {
   size_t *near = batten_alloc_array(ctx, NEIGHBOURS_MAX, sizeof *near);
   double *distance = batten_alloc_array(ctx, NEIGHBOURS_MAX, sizeof *distance);
@@ -144,10 +159,9 @@ static batten_status measure_gaps(batten_context *ctx, surface_data *d, size_t k
              : lines   ? gap_of_lines(d, i, index + i * k, near, distance)
                        : 0;
   }
-  for (size_t i = 0; i < d->count; i++) {
-    d->gap[i] = fmax(d->spacing[i], own[i]);
-    for (size_t j = 0; d->n == 3 && j < k; j++) d->gap[i] = fmax(d->gap[i], own[index[i * k + j]]);
-  }
+  for (size_t i = 0; i < d->count; i++) d->in_lines += d->n == 3 && own[i] > 3 * d->spacing[i];
+  for (unsigned round = 0; d->n == 3 && round < ROUNDS; round++) spread(d->count, k, index, own, d->gap);
+  for (size_t i = 0; i < d->count; i++) d->gap[i] = fmax(d->spacing[i], (d->n == 3 ? LINE_GAP : 1) * own[i]);
 done:
   batten_free(ctx, near);
   batten_free(ctx, distance);

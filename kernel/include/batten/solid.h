@@ -17,7 +17,8 @@ extern "C" {
 typedef struct batten_solid batten_solid;
 
 typedef enum batten_orientation {
-  BATTEN_ORIENT_AUTO = 0, /* check; cure from given normals, else from estimated ones, only where needed */
+  BATTEN_ORIENT_AUTO = 0, /* check; cure from given normals, else from estimated ones, only where needed: where the
+                             check asks for it, and where most points lie in lines far apart (planar cuts) */
   BATTEN_ORIENT_NEVER,    /* carrier alone; the check still tells */
   BATTEN_ORIENT_GIVEN,    /* always use the given normals */
   BATTEN_ORIENT_ESTIMATE  /* always estimate normals and use them */
@@ -45,7 +46,7 @@ typedef enum batten_orientation_used {
 
 typedef enum batten_sign_state {
   BATTEN_SIGN_CLEAN = 0, /* first fit passed the check */
-  BATTEN_SIGN_CURED,     /* the refit with orientation passed it */
+  BATTEN_SIGN_CURED,     /* the refit with orientation passed it and has taken the first one's place */
   BATTEN_SIGN_AMBIGUOUS  /* the check still finds something: status BATTEN_W_AMBIGUOUS */
 } batten_sign_state;
 
