@@ -1,6 +1,7 @@
 /* Outward normals of unoriented surface points: the choice between least energy and local planes.
  *
- * Points are moved and scaled to the unit size (see orient.h), oriented there by orient_planes.c. */
+ * Points are moved and scaled to the unit size (see orient.h). Planes come first: they are one of energy's starts and
+ * what AUTO falls back to. Energy works on all points or, above energy_points, on a well-spread subset. */
 #include "orient.h"
 
 #include <math.h>
@@ -9,11 +10,12 @@
 #include "base/checked.h"
 #include "basis/eigen3.h"
 
-static const double SAME = 1e-9; /* unit size: nearer points are one */
-static const double DOUBT =
-    0.1; /* by which planes must be better: noise, rims and uneven samples make some hundredths */
-static const double FLAT =
-    1e-10; /* thickness over length; rounding of coordinates alone gives 1e-16 times their distance from 0 */
+/* Unit size: nearer points are one. */
+static const double SAME = 1e-9;
+/* By which planes must be less in doubt than energy: noise, rims and uneven samples make some hundredths. */
+static const double DOUBT = 0.1;
+/* Thickness over length; rounding of coordinates alone gives 1e-16 times their distance from 0. */
+static const double FLAT = 1e-10;
 
 /* Centroid to 0 and twice the root mean square distance from it to 1. Refuses what lies on a line or plane. */
 static batten_status to_unit_size(batten_context *ctx, unsigned n, size_t count, const double *points, double *unit) {

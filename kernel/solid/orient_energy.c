@@ -3,14 +3,15 @@
  * The normals are the unit gradients g for which the spline through the points (values near 0) has the least energy
  * g' M g, see orient_system.c. The problem is not convex; what finds the right valley:
  *
- *   lambda   weight of smoothing: f minimises |f|^2 + sum f(x_i)^2 / lambda. A large one passes over noise and uneven
- * samples but blurs thin walls; so lambda walks down from 1e-2 in the unit size, each step starts from the last one's
- *            result, and where no sign moved over a step, the orientation is settled. Where the normals get rougher
- * instead (batten_orient_doubt), noise has taken over, and the step before counts. (A sphere of diameter 1 with
- * lambda = 1e-2: values may leave 0 by some percent of the diameter.) starts   at every lambda also the eigenvector
- * of M's smallest eigenvalue, at the first also the local planes: the result of least energy goes on. pieces   a
- * patch, a sheet or a component that is turned round as a whole is a valley of its own: the neighbour graph falls
- *            into pieces there; each is turned on trial, and stays so when that lowers the energy.
+ *   lambda   weight of smoothing: f minimises |f|^2 + sum f(x_i)^2 / lambda. A large one passes over noise and
+ *            uneven samples but blurs thin walls (1e-2, a sphere of diameter 1: values may leave 0 by some percent
+ *            of the diameter). So lambda walks down from 1e-2 in the unit size, each step starts from the last
+ *            one's result, and where no sign moved over a step, the orientation is settled. Where the normals get
+ *            rougher instead (batten_orient_doubt), noise has taken over, and the step before counts.
+ *   starts   at every lambda also the eigenvector of M's smallest eigenvalue, at the first also the local planes:
+ *            the result of least energy goes on.
+ *   pieces   a patch, a sheet or a component that is turned round as a whole is a valley of its own: the neighbour
+ *            graph falls into pieces there; each is turned on trial, and stays so when that lowers the energy.
  *
  * At the end the extreme points tell outside from inside. */
 #include "orient_energy.h"

@@ -1,7 +1,7 @@
 /* min g' M g over unit vectors g_i: L-BFGS on the product of spheres.   [Nocedal, Wright 2006, alg. 7.4]
  *
  * Gradients and steps are projected to the tangent planes of the spheres, points come back to them by normalisation,
- * pairs of earlier steps are projected where they are used. What makes it fast is the initial metric: the Hessian is
+ * pairs of earlier steps were projected when they were made. What makes it fast is the initial metric: the Hessian is
  * about 2 M, so S / 2 = M^-1 / 2 stands where a multiple of the identity is usual: 5 to 40 steps instead of 100 to
  * 300. */
 #include <math.h>

@@ -9,16 +9,15 @@
  *     [      P'        E'   0 ]  c        H_ij  = Hessian of phi           E_i = (0, I)
  *
  * Here values and polynomial are eliminated instead, of which only a system of N is lambda's business. With
- * d = -P (P'P)^-1 [0; I] the side condition P'a + E'b = 0 is a = Z u + d sum b_j, Z an orthonormal basis of null(P'),
- * and
+ * d = -P (P'P)^-1 [0; I] the side condition P'a + E'b = 0 is a = Z u + d sum b_j, with Z an orthonormal basis
+ * of null(P'), and
  *
  *     M = S^-1,   S = -H + e_r(j,c) + e_c(i,r) + (d'V d + lambda d'd)(r,c) - Y'Y,
  *     e_r(j,c) = d_r' W(:,jc),    Y = L^-1 Z'(W + V d (1' x I)),    L L' = Z'V Z + lambda I.
  *
  * So M's smallest eigenvector is S's largest, and S is the natural preconditioner: both are kept, S in the upper
- * triangle and its Cholesky factor in the lower one. Cost of a lambda: about (n N)^2 N + (n N)^3 / 3 flops; of the (n
- * + 1) N way: five times that. */
-#include <assert.h>
+ * triangle and its Cholesky factor in the lower one. Cost of a lambda: about (n N)^2 N + (n N)^3 / 3 flops; by way
+ * of the Hermite matrix five times that. */
 #include <math.h>
 #include <string.h>
 
