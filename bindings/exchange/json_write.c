@@ -53,8 +53,9 @@ const bx_carrier_layout *bx_layout_named(const char *kind_name) {
 
 /* ---- can it be saved? --------------------------------------------------------------------------- */
 
-/* Before a file is opened: no callbacks, not too deep. Recursion no deeper than BX_CARRIER_DEPTH. */
-static batten_status check_carrier(batten_context *ctx, const batten_carrier *carrier, unsigned depth) {
+/* Before a file is opened: is there a callback? The kernel nests no deeper than BX_CARRIER_DEPTH, so this recursion,
+ * and that of writing, goes no deeper either. */
+static batten_status check_carrier(batten_context *ctx, const batten_carrier *carrier) {
   batten_carrier_parts parts;
   batten_carrier_get_parts(carrier, &parts);
   if (!bx_layout_of(parts.kind))
@@ -62,12 +63,9 @@ static batten_status check_carrier(batten_context *ctx, const batten_carrier *ca
                        "carrier: a %s cannot be saved, its function is the host's; replace it by "
                        "another carrier",
                        batten_carrier_kind_name(parts.kind));
-  if (depth >= BX_CARRIER_DEPTH)
-    return batten_fail(ctx, BATTEN_E_TOO_LARGE, "carrier: nested deeper than %d", BX_CARRIER_DEPTH);
   batten_status st = BATTEN_OK;
-  for (int i = 0; st == BATTEN_OK && i < 2 && parts.children[i]; i++)
-    st = check_carrier(ctx, parts.children[i], depth + 1);
-  if (st == BATTEN_OK && parts.solid) st = check_carrier(ctx, batten_solid_carrier(parts.solid), depth + 1);
+  for (int i = 0; st == BATTEN_OK && i < 2 && parts.children[i]; i++) st = check_carrier(ctx, parts.children[i]);
+  if (st == BATTEN_OK && parts.solid) st = check_carrier(ctx, batten_solid_carrier(parts.solid));
   return st;
 }
 
@@ -116,7 +114,7 @@ static void put_spline(bx_writer *w, const batten_spline *spline) {
 
 static void put_solid_members(bx_writer *w, const batten_solid *solid);
 
-/* Recursion no deeper than BX_CARRIER_DEPTH: checked before. */
+/* Recursion no deeper than BX_CARRIER_DEPTH. */
 static void put_carrier(bx_writer *w, const batten_carrier *carrier) {
   batten_carrier_parts p;
   batten_carrier_get_parts(carrier, &p);
@@ -181,7 +179,7 @@ static batten_status check_path(batten_context *ctx, const char *path, const voi
 batten_status batten_save_solid(batten_context *ctx, const batten_solid *solid, const char *path) {
   bx_writer w;
   batten_status st = check_path(ctx, path, solid, "solid");
-  if (st == BATTEN_OK) st = check_carrier(ctx, batten_solid_carrier(solid), 0);
+  if (st == BATTEN_OK) st = check_carrier(ctx, batten_solid_carrier(solid));
   if (st == BATTEN_OK) st = bx_create(&w, ctx, path);
   if (st != BATTEN_OK) return st;
   bx_put_text(&w, "{\"batten\": \"solid\", \"version\": 1,\n");
@@ -193,7 +191,7 @@ batten_status batten_save_solid(batten_context *ctx, const batten_solid *solid, 
 batten_status batten_save_carrier(batten_context *ctx, const batten_carrier *carrier, const char *path) {
   bx_writer w;
   batten_status st = check_path(ctx, path, carrier, "carrier");
-  if (st == BATTEN_OK) st = check_carrier(ctx, carrier, 0);
+  if (st == BATTEN_OK) st = check_carrier(ctx, carrier);
   if (st == BATTEN_OK) st = bx_create(&w, ctx, path);
   if (st != BATTEN_OK) return st;
   batten_carrier_parts parts;

@@ -67,6 +67,13 @@ static const struct {
      "ply\nformat binary_little_endian 1.0\nelement vertex 2147483647\nproperty double x\nproperty double y\n"
      "property double z\nend_header\n12345678123456781234567812",
      "a.ply: byte 153: the file ends here; x is missing", 'p'},
+    {"a.ply", "ply\nformat ascii 1.0\nelement\n", "a.ply:3: a name is missing", 'p'},
+    {"a.ply",
+     "ply\nformat ascii 1.0\nelement vertex 1\nproperty float "
+     "a234567890123456789012345678901234567890123456789012345678901234\n",
+     "a.ply:4: the name 'a2345678901234567890123456789012...' has more than 63 characters", 'p'},
+    {"a.ply", "ply\nformat ascii 1.0\nelement face 1\nproperty list uchar float vertex_indices\n",
+     "a.ply:4: corners of faces as floating-point numbers", 'm'},
     {"a.obj", "v 1 2\n", "a.obj:1: z is missing", 'p'},
     {"a.obj", "v 1 2 3 0.5\n", "a.obj:1: w: a weight other than 1; rational vertices are not read", 'p'},
     {"a.obj", "v 1 nan 3\n", "a.obj:1: y: 'nan' is not finite", 'p'},
@@ -130,10 +137,16 @@ int main(void) {
   batten_cloud cloud = {0};
   T_STATUS(points_of(ctx, "a.xyz", nul, sizeof nul - 1, 0, &cloud), BATTEN_E_FORMAT, ctx,
            "a.xyz:2: a byte of value 0 in column 3; is this a text file");
+  char wide[600];
+  for (size_t i = 0; i < sizeof wide; i++) wide[i] = i % 2 ? ' ' : '1';
+  T_STATUS(points_of(ctx, "a.xyz", wide, sizeof wide, 0, &cloud), BATTEN_E_FORMAT, ctx,
+           "a.xyz:1: 300 columns; at most 256 are read");
+  batten_mesh *mesh = NULL;
+  T_STATUS(batten_read_mesh(ctx, "a.vtp", &mesh), BATTEN_E_INVALID, ctx, "meshes are read from .ply .obj .off .stl");
   size_t peak = batten_bytes_peak(ctx);
   T_CHECK(peak < 1 << 20, "whatever headers declare: at most %zu bytes were held", peak);
   batten_context_free(ctx);
   T_CHECK(memory.live == 0, "all is released");
-  printf("# %d malformed files\n", CASES + 1);
+  printf("# %d malformed files\n", CASES + 3);
   return t_done();
 }

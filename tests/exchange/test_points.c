@@ -129,10 +129,11 @@ static void test_samples(batten_context *ctx) {
 static void test_binary(batten_context *ctx) {
   for (int big = 0; big < 2; big++) {
     unsigned char file[512];
-    size_t at = (size_t)snprintf((char *)file, sizeof file,
-                                 "ply\nformat binary_%s_endian 1.0\nelement vertex 2\nproperty double x\n"
-                                 "property float y\nproperty short z\nproperty list uchar ushort l\nend_header\n",
-                                 big ? "big" : "little");
+    size_t at = (size_t)snprintf(
+        (char *)file, sizeof file,
+        "ply\nformat binary_%s_endian 1.0\nelement vertex 2\nproperty double x\n"
+        "property float y\nproperty short z\nproperty char c\nproperty list uchar ushort l\nend_header\n",
+        big ? "big" : "little");
     for (int i = 0; i < 2; i++) {
       double x = 1.5 - 3 * i;
       float y = 2.25f;
@@ -144,6 +145,7 @@ static void test_binary(batten_context *ctx) {
       for (int k = 0; k < 8; k++) file[at++] = (unsigned char)(bits64 >> (big ? 56 - 8 * k : 8 * k));
       for (int k = 0; k < 4; k++) file[at++] = (unsigned char)(bits32 >> (big ? 24 - 8 * k : 8 * k));
       for (int k = 0; k < 2; k++) file[at++] = (unsigned char)(bits16 >> (big ? 8 - 8 * k : 8 * k));
+      file[at++] = 0x80;
       file[at++] = (unsigned char)i;
       for (int k = 0; k < 2 * i; k++) file[at++] = 9;
     }
