@@ -92,6 +92,7 @@ static void draw_dot(const raster_job *job, const target *t, size_t index) {
   const picture_scene *s = job->scene;
   float p[3];
   project(job->camera, job->buffer->samples, s->dots + 3 * index, p);
+  if (!(p[2] > 0 && p[2] < 2)) return; /* far off the mesh: behind the camera, or in its face */
   double radius = s->dot_radius * job->camera->focal * p[2] * job->buffer->samples;
   size_t x0, x1, y0, y1;
   cells_within(p[0] - radius, p[0] + radius, 0, t->width, &x0, &x1);

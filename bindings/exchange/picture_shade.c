@@ -19,7 +19,7 @@ enum {
   MAP_MIN = 64, /* their side: finer for larger pictures */
   MAP_MAX = 512,
   CHUNK = 4096, /* shaded points in a task */
-  TAPS = 12     /* places in a depth map that are averaged for the ground */
+  TAPS = 8      /* places in a depth map that are averaged for the ground */
 };
 
 typedef struct beam {
@@ -47,9 +47,10 @@ typedef struct shading {
   size_t total;      /* with the ground behind the last row */
   beam beams[BEAMS];
   size_t beam_first, beam_end; /* the batch at work */
-  float *maps;                 /* [BATCH][map][map] */
-  size_t map, ground;          /* sides of a depth map and of the ground's grid */
-  float reach;                 /* half the side of the ground's grid */
+  float taps[TAPS][2];
+  float *maps;        /* [BATCH][map][map] */
+  size_t map, ground; /* sides of a depth map and of the ground's grid */
+  float reach;        /* half the side of the ground's grid */
 } shading;
 
 /* ---- vectors ------------------------------------------------------------------------------------- */
@@ -275,16 +276,23 @@ static float reached(const float *map, size_t size, const beam *b, const float p
 }
 
 /* The same over a disc of the map: the few beams of a lamp would leave the edge of a shadow each. */
-static float reached_about(const float *map, size_t size, const beam *b, const float p[3]) {
-  const float radius = 0.047f;
+static float reached_about(const shading *s, const float *map, const beam *b, const float p[3]) {
   float sum = 0;
-  for (int i = 0; i < TAPS; i++) {
-    float r = radius * sqrtf(((float)i + 0.5f) / TAPS), angle = golden_angle * (float)i;
-    float x = r * cosf(angle), y = r * sinf(angle), tap[3];
-    for (size_t k = 0; k < 3; k++) tap[k] = p[k] + x * b->u[k] + y * b->v[k];
-    sum += reached(map, size, b, tap);
+  for (size_t i = 0; i < TAPS; i++) {
+    float tap[3];
+    for (size_t k = 0; k < 3; k++) tap[k] = p[k] + s->taps[i][0] * b->u[k] + s->taps[i][1] * b->v[k];
+    sum += reached(map, s->map, b, tap);
   }
   return sum / TAPS;
+}
+
+static void make_taps(float taps[TAPS][2]) {
+  const float radius = 0.047f; /* of the unit ball: as far as the shadows of neighbouring beams lie apart */
+  for (int i = 0; i < TAPS; i++) {
+    float r = radius * sqrtf(((float)i + 0.5f) / TAPS), angle = golden_angle * (float)i;
+    taps[i][0] = r * cosf(angle);
+    taps[i][1] = r * sinf(angle);
+  }
 }
 
 static void light_chunk(void *arg, size_t chunk) {
@@ -304,7 +312,7 @@ static void light_chunk(void *arg, size_t chunk) {
       float cosine = dotf(p->normal, b->d);
       if (cosine <= 0) continue;
       const float *map = s->maps + (k - s->beam_first) * s->map * s->map;
-      float part = p->kind == 3 ? reached_about(map, s->map, b, from) : reached(map, s->map, b, from);
+      float part = p->kind == 3 ? reached_about(s, map, b, from) : reached(map, s->map, b, from);
       if (part <= 0) continue;
       for (size_t c = 0; c < 3; c++) p->light[c] += part * cosine * b->color[c];
       if (b->glossy) {
@@ -395,7 +403,8 @@ batten_status picture_shade(batten_context *ctx, const picture_scene *scene, con
   *s = (shading){.scene = scene, .camera = camera, .buffer = buffer, .image = image, .reach = 3};
   make_lights(camera, s->beams);
   for (s->map = MAP_MAX; s->map > MAP_MIN && s->map > image->width && s->map > height;) s->map /= 2;
-  s->ground = s->map / 2;
+  s->ground = s->map * 3 / 8;
+  make_taps(s->taps);
   s->row_first = batten_alloc_array(ctx, height + 1, sizeof *s->row_first);
   s->maps = batten_alloc_array(ctx, BATCH * s->map * s->map, sizeof *s->maps);
   if (!s->row_first || !s->maps) goto done;

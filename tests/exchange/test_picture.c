@@ -228,6 +228,9 @@ static void test_odd(batten_context *ctx) {
     o.elevation_deg = elevations[i];
     T_OK(batten_picture_mesh(ctx, mesh, &o, path_a), ctx);
   }
+  const double far[] = {7e6, 7e6, 1, 7e6 + 3, 7e6 + 3, 3, 0, 0, 0, 1e300, -1e300, 1e300};
+  o.points = far, o.point_count = 4;
+  T_OK(batten_picture_mesh(ctx, mesh, &o, path_a), ctx);
   batten_mesh_free(mesh);
 }
 
