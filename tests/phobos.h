@@ -1,8 +1,6 @@
 /* Phobos for tests and benchmarks: the surface points of P. C. Thomas's shape model (NASA PDS) when they are at hand,
- * else a bumpy ellipsoid of the same size made here; and random subsets of them, drawn uniformly by area.
- *
- * The model is a latitude-longitude grid, crowded at the poles, so a point's weight is r^2 cos(latitude). Drawn without
- * replacement by the keys u^(1/weight) [Efraimidis, Spirakis 2006]. */
+ * else a bumpy ellipsoid of the same size made here; and random subsets of them. Every point is as likely as every
+ * other; the model is a latitude-longitude grid, so both the sample and the points left over are denser near the poles. */
 #ifndef PHOBOS_H
 #define PHOBOS_H
 
@@ -16,19 +14,9 @@ typedef struct phobos {
   bool real;
 } phobos;
 
-typedef struct phobos_key {
-  double key;
-  size_t index;
-} phobos_key;
-
-static inline int phobos_by_key(const void *a, const void *b) {
-  double x = ((const phobos_key *)a)->key, y = ((const phobos_key *)b)->key;
-  return (x < y) - (x > y);
-}
-
 static inline bool phobos_read(const char *folder, phobos *out) {
   char path[4096], line[256];
-  snprintf(path, sizeof path, "%s/phobos/phobos_thomas_xyz.txt", folder ? folder : "");
+  snprintf(path, sizeof path, "%s/data/phobos/phobos_thomas_xyz.txt", folder ? folder : "");
   FILE *file = folder ? fopen(path, "r") : NULL;
   if (!file) return false;
   out->real = true;
@@ -61,20 +49,16 @@ static inline phobos phobos_points(void) {
   return p;
 }
 
-/* Reorders p so that the first n points are the sample with this seed. */
+/* Shuffles p: the first n points are then the sample of n with this seed. */
 static inline void phobos_draw(phobos *p, uint64_t seed) {
-  phobos_key *keys = malloc(p->count * sizeof *keys);
-  double *shuffled = malloc(p->count * 3 * sizeof *shuffled);
-  for (size_t i = 0; i < p->count; i++) {
-    const double *x = p->points + 3 * i;
-    double r2 = x[0] * x[0] + x[1] * x[1] + x[2] * x[2], weight = sqrt(r2) * sqrt(x[0] * x[0] + x[1] * x[1]);
-    keys[i] = (phobos_key){log(t_uniform(&seed) + 1e-300) / (weight + 1e-6 * r2), i};
+  for (size_t i = p->count; i > 1; i--) {
+    size_t j = (size_t)(t_uniform(&seed) * (double)i);
+    double *a = p->points + 3 * (i - 1), *b = p->points + 3 * j;
+    for (int c = 0; c < 3; c++) {
+      double keep = a[c];
+      a[c] = b[c], b[c] = keep;
+    }
   }
-  qsort(keys, p->count, sizeof *keys, phobos_by_key);
-  for (size_t i = 0; i < p->count; i++) memcpy(shuffled + 3 * i, p->points + 3 * keys[i].index, 3 * sizeof(double));
-  free(p->points);
-  free(keys);
-  p->points = shuffled;
 }
 
 static inline double phobos_diameter(const phobos *p) {
@@ -89,37 +73,38 @@ static inline double phobos_diameter(const phobos *p) {
 }
 
 typedef struct phobos_error {
-  double mean_radius, mean, max; /* km; mean and max of the error along the ray through the point */
-  size_t lost;                   /* points without a crossing on their ray */
+  double mean_radius, mean, max; /* km */
+  size_t lost;                   /* points from which no surface was found */
 } phobos_error;
 
-/* Distance between each of the points first .. count-1 and the surface f = 0, along the ray from the centre: an upper bound of
- * the distance. Secant steps in batches, on the radius. */
+/* Distance between each of the points first .. count-1 and the surface f = 0: Newton steps along the gradient to a point of
+ * the surface, so an upper bound of the distance. */
 static inline phobos_error phobos_errors(batten_context *ctx, const batten_field *field, const phobos *p,
                                          size_t first) {
   size_t n = p->count - first;
+  const double *start = p->points + 3 * first;
   double *x = malloc(3 * n * sizeof *x), *g = malloc(3 * n * sizeof *g), *v = malloc(n * sizeof *v);
-  double *scale = malloc(n * sizeof *scale);
   phobos_error e = {0};
-  for (size_t i = 0; i < n; i++) scale[i] = 1;
-  for (int step = 0; step < 12; step++) {
-    for (size_t i = 0; i < 3 * n; i++) x[i] = p->points[3 * first + i] * scale[i / 3];
+  memcpy(x, start, 3 * n * sizeof *x);
+  for (int step = 0; step < 10; step++) {
     if (field->evaluate(field->user, ctx, n, x, v, g, NULL) < 0) break;
     for (size_t i = 0; i < n; i++) {
-      const double *q = p->points + 3 * (first + i);
-      double slope = g[3 * i] * q[0] + g[3 * i + 1] * q[1] + g[3 * i + 2] * q[2], move = -v[i] / slope;
-      scale[i] += fmax(-0.03, fmin(0.03, move));
+      const double *d = g + 3 * i, square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+      for (size_t c = 0; c < 3; c++) x[3 * i + c] -= v[i] * d[c] / square;
     }
   }
+  if (field->evaluate(field->user, ctx, n, x, v, g, NULL) < 0) e.lost = n;
   for (size_t i = 0; i < n; i++) {
-    const double *q = p->points + 3 * (first + i);
-    double r = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]), error = fabs(scale[i] - 1) * r;
+    const double *q = start + 3 * i, *y = x + 3 * i, *d = g + 3 * i;
+    double r = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]);
+    double error = sqrt((y[0] - q[0]) * (y[0] - q[0]) + (y[1] - q[1]) * (y[1] - q[1]) + (y[2] - q[2]) * (y[2] - q[2]));
+    double left = fabs(v[i]) / sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
     e.mean_radius += r / (double)n;
-    if (!(error < 0.25 * r)) e.lost++;
+    if (!(left < 1e-6 * r)) e.lost++;
     e.mean += error / (double)n;
     e.max = fmax(e.max, error);
   }
-  free(x), free(g), free(v), free(scale);
+  free(x), free(g), free(v);
   return e;
 }
 

@@ -45,7 +45,7 @@ int main(int argc, char **argv) {
   batten_carrier *near_balls = NULL, *far_balls = NULL;
   batten_solid *cube = NULL, *deformed = NULL;
   double points[90][3];
-  scene_cube(90, 1, &points[0][0]);
+  scene_cube_points(1, 90, &points[0][0]);
 
   batten_status status = two_balls(ctx, 0.4, &near_balls);
   batten_solid_options o = batten_solid_options_default();
