@@ -52,7 +52,7 @@ int main(int argc, char **argv) {
   o.carrier = near_balls;
   o.orientation = BATTEN_ORIENT_NEVER; /* as the paper: the carrier decides */
   if (status >= 0) status = batten_solid_fit(ctx, 3, 90, &points[0][0], &o, &cube, NULL);
-  if (status >= 0) status = two_balls(ctx, 0.7, &far_balls);
+  if (status >= 0) status = two_balls(ctx, 0.6, &far_balls);
   if (status >= 0) status = batten_solid_with_carrier(ctx, cube, far_balls, &deformed);
   if (status >= 0) status = picture(ctx, cube, argv[1], "cube.png");
   if (status >= 0) status = picture(ctx, deformed, argv[1], "cube-deformed.png");

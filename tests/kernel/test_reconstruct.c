@@ -63,8 +63,8 @@ static const shape shapes[] = {
     {"Phobos, 942 points", 3, phobos_942, NULL, 1, 0},
 };
 
-/* Share of random points in the box, farther than 0.1 from the true surface, whose side is wrong. */
-static double wrong_sides(batten_context *ctx, const shape *s, const batten_solid *solid) {
+/* Share of random points around the box, farther than `margin` from the true surface, whose side is wrong. */
+static double wrong_sides(batten_context *ctx, const shape *s, const batten_solid *solid, double margin) {
   static double probes[PROBES * 3], values[PROBES];
   uint64_t seed = 7;
   size_t made = 0;
@@ -73,7 +73,7 @@ static double wrong_sides(batten_context *ctx, const shape *s, const batten_soli
   while (made < PROBES) {
     double *p = probes + made * s->n;
     for (unsigned c = 0; c < s->n; c++) p[c] = lower[c] + (upper[c] - lower[c]) * (1.4 * scene_uniform(&seed) - 0.2);
-    if (fabs(s->truth(p)) > 0.1) made++;
+    if (fabs(s->truth(p)) > margin) made++;
   }
   if (batten_solid_evaluate(ctx, solid, PROBES, probes, values, NULL, NULL) < 0) return 1;
   size_t wrong = 0;
@@ -143,7 +143,8 @@ static void reconstruct(batten_context *ctx, const shape *s) {
     closed = polygonize(ctx, solid, &m, &crossings) && m.closed && m.manifold && m.oriented;
     components = m.components, genus = m.genus, size = m.volume, share = m.angles_above_20deg;
   }
-  double wrong = s->truth ? wrong_sides(ctx, s, solid) : 0;
+  /* No sample says more about the surface than its spacing does. */
+  double wrong = s->truth ? wrong_sides(ctx, s, solid, fmax(0.1, info.spacing)) : 0;
   printf("# | %s | %s | %s | %zu | %ld | %.4g | %.3f | %.2f |\n", s->name, signs[info.sign],
          orientations[info.orientation], components, genus, size, 100 * wrong,
          info.time_fit_s + info.time_check_s + info.time_orient_s);
