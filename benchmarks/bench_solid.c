@@ -1,6 +1,6 @@
-/* The paper's Table 2 and beyond: matrix formation, solution, 10,000 surface nodes, on random points of Phobos, with the
- * error over the points that were not used. [Savchenko et al. 1995, section 5.1]
- * Usage: bench-solid [N ...]      default 184 377 628 942 2000 4000 8000 16000 */
+/* The paper's Table 2 and beyond: matrix formation, solution, 10,000 surface nodes, on random points of Phobos, with
+ * the error over the points that were not used. [Savchenko et al. 1995, section 5.1] Usage: bench-solid [N ...]
+ * default 184 377 628 942 2000 4000 8000 16000 */
 #include "phobos.h"
 
 #include <batten/batten.h>
@@ -100,10 +100,12 @@ int main(int argc, char **argv) {
   char blas[256];
   batten_blas_describe(blas, sizeof blas);
   printf("batten %s, %u threads, BLAS: %s, %u threads\n", batten_version(), o.threads, blas, batten_blas_threads());
-  printf("%s, %zu points, largest diameter %.2f km, seed %d\n\n", p.real ? "Phobos (Thomas)" : "bumpy ellipsoid", p.count,
-         diameter, SEED);
-  printf("| N | formation s | solution s | 10,000 nodes s | paper (6 transputers) | method | steps | residual | mean error %% of "
-         "mean radius | max error %% of diameter |\n|---|---|---|---|---|---|---|---|---|---|\n");
+  printf("%s, %zu points, largest diameter %.2f km, seed %d\n\n", p.real ? "Phobos (Thomas)" : "bumpy ellipsoid",
+         p.count, diameter, SEED);
+  printf(
+      "| N | formation s | solution s | 10,000 nodes s | paper (6 transputers) | method | steps | residual | mean "
+      "error %% of "
+      "mean radius | max error %% of diameter |\n|---|---|---|---|---|---|---|---|---|---|\n");
   size_t done = 0;
   for (size_t i = 0; i < count; i++) {
     size_t n = argc > 1 ? (size_t)strtoul(argv[i + 1], NULL, 10) : sizes[i];

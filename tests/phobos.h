@@ -1,6 +1,7 @@
 /* Phobos for tests and benchmarks: the surface points of P. C. Thomas's shape model (NASA PDS) when they are at hand,
  * else a bumpy ellipsoid of the same size made here; and random subsets of them. Every point is as likely as every
- * other; the model is a latitude-longitude grid, so both the sample and the points left over are denser near the poles. */
+ * other; the model is a latitude-longitude grid, so both the sample and the points left over are denser near the
+ * poles. */
 #ifndef PHOBOS_H
 #define PHOBOS_H
 
@@ -77,8 +78,8 @@ typedef struct phobos_error {
   size_t lost;                   /* points from which no surface was found */
 } phobos_error;
 
-/* Distance between each of the points first .. count-1 and the surface f = 0: Newton steps along the gradient to a point of
- * the surface, so an upper bound of the distance. */
+/* Distance between each of the points first .. count-1 and the surface f = 0: Newton steps along the gradient to a
+ * point of the surface, so an upper bound of the distance. */
 static inline phobos_error phobos_errors(batten_context *ctx, const batten_field *field, const phobos *p,
                                          size_t first) {
   size_t n = p->count - first;
@@ -97,7 +98,8 @@ static inline phobos_error phobos_errors(batten_context *ctx, const batten_field
   for (size_t i = 0; i < n; i++) {
     const double *q = start + 3 * i, *y = x + 3 * i, *d = g + 3 * i;
     double r = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]);
-    double error = sqrt((y[0] - q[0]) * (y[0] - q[0]) + (y[1] - q[1]) * (y[1] - q[1]) + (y[2] - q[2]) * (y[2] - q[2]));
+    double error =
+        sqrt((y[0] - q[0]) * (y[0] - q[0]) + (y[1] - q[1]) * (y[1] - q[1]) + (y[2] - q[2]) * (y[2] - q[2]));
     double left = fabs(v[i]) / sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
     e.mean_radius += r / (double)n;
     if (!(left < 1e-6 * r)) e.lost++;

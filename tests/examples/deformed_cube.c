@@ -1,6 +1,6 @@
-/* The paper's figure 5: a cube from 90 random surface points with the R-union of two balls as carrier, then deformed by
- * moving the balls apart while the spline stays. [Savchenko et al. 1995, section 6]
- * Usage: deformed_cube FOLDER      writes FOLDER/cube.png and FOLDER/cube-deformed.png */
+/* The paper's figure 5: a cube from 90 random surface points with the R-union of two balls as carrier, then deformed
+ * by moving the balls apart while the spline stays. [Savchenko et al. 1995, section 6] Usage: deformed_cube FOLDER
+ * writes FOLDER/cube.png and FOLDER/cube-deformed.png */
 #include "scenes.h"
 
 #include <batten/exchange.h>

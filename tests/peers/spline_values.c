@@ -1,5 +1,5 @@
-/* For compare_scipy.py: reads "n m smoothing N Q", N rows of coordinates and value, and Q rows of coordinates; prints U at
- * the Q points. smoothing is SciPy's: in the points' own unit, not in the unit box. */
+/* For compare_scipy.py: reads "n m smoothing N Q", N rows of coordinates and value, and Q rows of coordinates; prints
+ * U at the Q points. smoothing is SciPy's: in the points' own unit, not in the unit box. */
 #include <batten/batten.h>
 #include <math.h>
 #include <stdio.h>

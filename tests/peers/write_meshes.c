@@ -1,4 +1,5 @@
-/* For compare_meshio.py: writes the octahedron |x|/1 + |y|/2 + |z|/3 <= 1 (volume 8) in every mesh format to a folder. */
+/* For compare_meshio.py: writes the octahedron |x|/1 + |y|/2 + |z|/3 <= 1 (volume 8) in every mesh format to a
+ * folder. */
 #include <batten/exchange.h>
 #include <stdio.h>
 
