@@ -19,7 +19,8 @@ batten_status batten_solid_evaluate(batten_context *ctx, const batten_solid *s, 
   size_t n = s->n, bytes;
   if (!points) return batten_fail(ctx, BATTEN_E_INVALID, "points: NULL; give [%zu][%u] numbers", count, s->n);
   size_t each = (values ? 1 : 0) + (gradients ? n : 0) + (hessians ? n * n : 0);
-  if (!batten_mul3(count, each, sizeof(double), &bytes)) return batten_fail(ctx, BATTEN_E_TOO_LARGE, "count: %zu; too many", count);
+  if (!batten_mul3(count, each, sizeof(double), &bytes))
+    return batten_fail(ctx, BATTEN_E_TOO_LARGE, "count: %zu; too many", count);
   /* The carrier goes first, aside: what it says may be an error of the host's. */
   double *aside = batten_alloc(ctx, bytes), *next = aside;
   if (!aside) return BATTEN_E_NOMEM;

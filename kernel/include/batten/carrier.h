@@ -45,9 +45,10 @@ BATTEN_API batten_status batten_carrier_torus(batten_context *ctx, const double 
                                               double major_radius, double minor_radius, batten_carrier **out);
 BATTEN_API batten_status batten_carrier_half_space(batten_context *ctx, unsigned n, const double *point,
                                                    const double *normal, batten_carrier **out);
-/* -1 < alpha <= 1; 1 gives max / min; 0 is the usual choice, smooth but where both fields vanish. There (and where they
- * are equal, for alpha = 1) the derivatives are the mean of both sides: (grad f + grad g) / (1 + alpha), no second-order
- * term. a and b stay the caller's. Up to 64 levels of composites and solids: combine many in pairs, not in a chain. */
+/* -1 < alpha <= 1; 1 gives max / min; 0 is the usual choice, smooth but where both fields vanish. There (and where
+ * they are equal, for alpha = 1) the derivatives are the mean of both sides: (grad f + grad g) / (1 + alpha), no
+ * second-order term. a and b stay the caller's. Up to 64 levels of composites and solids: combine many in pairs,
+ * not in a chain. */
 BATTEN_API batten_status batten_carrier_union(batten_context *ctx, batten_carrier *a, batten_carrier *b,
                                               double alpha, batten_carrier **out);
 BATTEN_API batten_status batten_carrier_intersection(batten_context *ctx, batten_carrier *a, batten_carrier *b,
@@ -58,15 +59,17 @@ BATTEN_API batten_status batten_carrier_callback(batten_context *ctx, const batt
                                                  double difference_step, batten_carrier **out);
 BATTEN_API batten_status batten_carrier_solid(batten_context *ctx, struct batten_solid *solid, batten_carrier **out);
 
-/* Ellipsoid fitted to points [count][n], count > n: centre and principal axes of the points' second moments, semi-axes
- * sqrt(n * variance along them). Points spread evenly over a sphere give that sphere. Of an ellipsoid sampled evenly by
- * area the long axes come out too short and the short ones too long: by 8 and 4 % for axes 1 : 1 : 2, by 13 and 6 % for
- * 1 : 1 : 10. What `auto` means. Fails: INVALID, NOMEM, SINGULAR (flat: names the direction). */
+/* Ellipsoid fitted to points [count][n], count > n: centre and principal axes of the points' second moments,
+ * semi-axes sqrt(n * variance along them). Points spread evenly over a sphere give that sphere. Of an ellipsoid
+ * sampled evenly by area the long axes come out too short and the short ones too long: by 8 and 4 % for axes 1 : 1
+ * : 2, by 13 and 6 % for 1 : 1 : 10. What `auto` means. Fails: INVALID, NOMEM, SINGULAR (flat: names the
+ * direction). */
 BATTEN_API batten_status batten_carrier_fit(batten_context *ctx, unsigned n, size_t count, const double *points,
                                             batten_carrier **out);
 
-/* points [count][n]; values [count], gradients [count][n], hessians [count][n][n]; each may be NULL. On kinks (edges of
- * a box's distance field, the axis of a cylinder or torus) one side's derivatives, or 0 where none is preferred. */
+/* points [count][n]; values [count], gradients [count][n], hessians [count][n][n]; each may be NULL. On kinks
+ * (edges of a box's distance field, the axis of a cylinder or torus) one side's derivatives, or 0 where none is
+ * preferred. */
 BATTEN_API batten_status batten_carrier_evaluate(batten_context *ctx, const batten_carrier *c, size_t count,
                                                  const double *points, double *values, double *gradients,
                                                  double *hessians);

@@ -27,8 +27,8 @@ typedef enum batten_orientation {
 typedef enum batten_orient_data {
   BATTEN_ORIENT_DATA_AUTO = 0,  /* gradients up to 2000 points, pairs above; the other where the check is not clean or
                                    the system too ill-conditioned */
-  BATTEN_ORIENT_DATA_GRADIENTS, /* Hermite-Birkhoff refit, no carrier, with the lowest order from m on whose kernel has
-                                   two derivatives to spare (from m = 2: r^3, r^4 ln r) */
+  BATTEN_ORIENT_DATA_GRADIENTS, /* Hermite-Birkhoff refit, no carrier, with the lowest order from m on whose kernel
+                                   has two derivatives to spare (from m = 2: r^3, r^4 ln r) */
   BATTEN_ORIENT_DATA_PAIRS      /* refit with points off the surface, same kernel and carrier */
 } batten_orient_data;
 
@@ -74,9 +74,9 @@ typedef struct batten_sign_check {
                                 from a tenth of the spacing before to as much behind along it */
   size_t flipped_neighbours; /* pairs of neighbouring points with locally like tangents whose gradients oppose */
   size_t phantom_components; /* pieces of f = 0 without data near them */
-  size_t phantom_cells;      /* grid cells crossed by f = 0 too far from all data: one gap of the contour in the plane,
-                                2.5 local spacings (or gaps between sampled lines) in space; and positive samples of f
-                                among 256 on spheres of 1.5 to 50 half diagonals of the box */
+  size_t phantom_cells;      /* grid cells crossed by f = 0 too far from all data: one gap of the contour in the
+                                plane, 2.5 local spacings (1.25 gaps between sampled lines) in space; and positive
+                                samples of f among 256 on spheres of 1.5 to 50 half diagonals of the box */
   int inside_out;            /* non-zero: f was positive far away and has been turned */
   int clean;                 /* none of these; phantom cells up to 0.2 % of the crossed ones do not count */
 } batten_sign_check;
@@ -90,8 +90,8 @@ typedef struct batten_solid_info {
   double orient_lambda;               /* smoothing at which the estimated orientation was settled */
   batten_sign_check check;            /* of the first fit */
   batten_sign_check check_final;      /* of the solid that is returned */
-  double residual_max;  /* max |f(x_i)| / (max - min of the interpolated values; where a carrier runs through all points
-                           its own size in the box) */
+  double residual_max;  /* max |f(x_i)| / (max - min of the interpolated values; where a carrier runs through all
+                           points its own size in the box) */
   double distance_max;  /* max |f(x_i)| / |grad f(x_i)|, caller's unit */
   double spacing;       /* median distance to the nearest other point, caller's unit */
   batten_spline_info spline; /* of the fit that is returned */
@@ -100,9 +100,9 @@ typedef struct batten_solid_info {
 
 /* Fit to points [count][n], n = 2 or 3. In one dimension an even number of points bounds intervals, and their order
  * orients them. Positive status: BATTEN_W_AMBIGUOUS, BATTEN_W_ACCURACY (residual_max above 1e-10). Fails as
- * batten_spline_fit, and INVALID for a carrier that the spline reproduces (the text says which to take): every carrier
- * alone with m >= 3 needs orientation, and without a carrier of the caller's it is estimated at once. *out untouched on
- * failure; info may be NULL. The check costs (about 1.5 check_cells)^n evaluations of f. */
+ * batten_spline_fit, and INVALID for a carrier that the spline reproduces (the text says which to take): every
+ * carrier alone with m >= 3 needs orientation, and without a carrier of the caller's it is estimated at once. *out
+ * untouched on failure; info may be NULL. The check costs (about 1.5 check_cells)^n evaluations of f. */
 BATTEN_API batten_status batten_solid_fit(batten_context *ctx, unsigned n, size_t count, const double *points,
                                           const batten_solid_options *opt, batten_solid **out,
                                           batten_solid_info *info);
