@@ -40,8 +40,6 @@ typedef int32_t batten_la_int;
                         IN ldb, const real *beta, real *c, IN ldc, LEN, LEN);                                      \
   void FORTRAN(s##syrk)(CH uplo, CH trans, IN n, IN k, const real *alpha, const real *a, IN lda, const real *beta, \
                         real *c, IN ldc, LEN, LEN);                                                                \
-  void FORTRAN(s##syr2k)(CH uplo, CH trans, IN n, IN k, const real *alpha, const real *a, IN lda, const real *b,   \
-                         IN ldb, const real *beta, real *c, IN ldc, LEN, LEN);                                     \
   void FORTRAN(s##trsm)(CH side, CH uplo, CH trans, CH diag, IN m, IN n, const real *alpha, const real *a, IN lda, \
                         real *b, IN ldb, LEN, LEN, LEN, LEN);                                                      \
   void FORTRAN(s##potrf)(CH uplo, IN n, real * a, IN lda, OUT info, LEN);                                          \

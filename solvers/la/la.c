@@ -90,14 +90,6 @@ void batten_la_syrk(batten_la_real real, char uplo, char trans, size_t n, size_t
   IN_PRECISION(real, syrk, &uplo, &trans, &ni, &ki, &a1, (const real_t *)a, &la, &b1, (real_t *)c, &lc, 1, 1);
 }
 
-void batten_la_syr2k(batten_la_real real, char uplo, char trans, size_t n, size_t k, double alpha, const void *a,
-                     size_t lda, const void *b, size_t ldb, double beta, void *c, size_t ldc) {
-  if (n == 0) return;
-  batten_la_int ni = to_int(n), ki = to_int(k), la = to_ld(lda), lb = to_ld(ldb), lc = to_ld(ldc);
-  IN_PRECISION(real, syr2k, &uplo, &trans, &ni, &ki, &a1, (const real_t *)a, &la, (const real_t *)b, &lb, &b1,
-               (real_t *)c, &lc, 1, 1);
-}
-
 void batten_la_trsm(batten_la_real real, char side, char uplo, char trans, size_t m, size_t n, double alpha,
                     const void *a, size_t lda, void *b, size_t ldb) {
   if (m == 0 || n == 0) return;

@@ -38,8 +38,6 @@ void batten_la_symm(batten_la_real real, char side, char uplo, size_t m, size_t 
                     size_t lda, const void *b, size_t ldb, double beta, void *c, size_t ldc);
 void batten_la_syrk(batten_la_real real, char uplo, char trans, size_t n, size_t k, double alpha, const void *a,
                     size_t lda, double beta, void *c, size_t ldc);
-void batten_la_syr2k(batten_la_real real, char uplo, char trans, size_t n, size_t k, double alpha, const void *a,
-                     size_t lda, const void *b, size_t ldb, double beta, void *c, size_t ldc);
 void batten_la_trsm(batten_la_real real, char side, char uplo, char trans, size_t m, size_t n, double alpha,
                     const void *a, size_t lda, void *b, size_t ldb);
 

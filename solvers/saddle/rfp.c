@@ -27,23 +27,6 @@ batten_rfp batten_rfp_view(batten_la_real real, size_t n, void *storage) {
 static void *low(const batten_rfp *b, size_t i, size_t j) { return batten_la_at(b->real, b->b11, i + j * b->ld); }
 static void *high(const batten_rfp *b, size_t i, size_t j) { return batten_la_at(b->real, b->b22, i + j * b->ld); }
 
-void batten_rfp_symm(const batten_rfp *b, size_t m, const void *x, size_t ldx, void *y, size_t ldy) {
-  const void *x2 = batten_la_at_const(b->real, x, b->n1);
-  void *y2 = batten_la_at(b->real, y, b->n1);
-  batten_la_symm(b->real, 'L', 'L', b->n1, m, 1, b->b11, b->ld, x, ldx, 0, y, ldy);
-  batten_la_symm(b->real, 'L', 'U', b->n2, m, 1, b->b22, b->ld, x2, ldx, 0, y2, ldy);
-  batten_la_gemm(b->real, 'N', 'N', b->n2, m, b->n1, 1, b->b21, b->ld, x, ldx, 1, y2, ldy);
-  if (b->n2 > 0) batten_la_gemm(b->real, 'T', 'N', b->n1, m, b->n2, 1, b->b21, b->ld, x2, ldx, 1, y, ldy);
-}
-
-void batten_rfp_syr2k(const batten_rfp *b, size_t m, const void *x, size_t ldx, const void *y, size_t ldy) {
-  const void *x2 = batten_la_at_const(b->real, x, b->n1), *y2 = batten_la_at_const(b->real, y, b->n1);
-  batten_la_syr2k(b->real, 'L', 'N', b->n1, m, -1, x, ldx, y, ldy, 1, b->b11, b->ld);
-  batten_la_gemm(b->real, 'N', 'T', b->n2, b->n1, m, -1, x2, ldx, y, ldy, 1, b->b21, b->ld);
-  batten_la_gemm(b->real, 'N', 'T', b->n2, b->n1, m, -1, y2, ldy, x, ldx, 1, b->b21, b->ld);
-  batten_la_syr2k(b->real, 'U', 'N', b->n2, m, -1, x2, ldx, y2, ldy, 1, b->b22, b->ld);
-}
-
 /* ---- Norm ---- */
 
 /* Adds |a[i]| to sums[i] and returns the sum of all. */
@@ -127,13 +110,15 @@ batten_status batten_rfp_cholesky(batten_context *ctx, const batten_rfp *b, size
   return BATTEN_OK;
 }
 
-size_t batten_rfp_weakest(const batten_rfp *b) {
+size_t batten_rfp_weakest(const batten_rfp *b, double *ratio) {
   size_t weakest = 0;
-  double least = INFINITY;
+  double least = INFINITY, largest = 0;
   for (size_t j = 0; j < b->n; j++) {
     double value = absolute(b->real, j < b->n1 ? low(b, j, j) : high(b, j - b->n1, j - b->n1));
+    largest = fmax(largest, value);
     if (value < least) least = value, weakest = j;
   }
+  *ratio = b->n > 0 ? least / largest * (least / largest) : 1;
   return weakest;
 }
 

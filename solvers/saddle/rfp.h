@@ -30,20 +30,14 @@ bool batten_rfp_count(size_t n, size_t *count);
 /* Views the storage of a matrix of order n. */
 batten_rfp batten_rfp_view(batten_la_real real, size_t n, void *storage);
 
-/* y := B x for m columns; x, y [m][ld]. */
-void batten_rfp_symm(const batten_rfp *b, size_t m, const void *x, size_t ldx, void *y, size_t ldy);
-
-/* B -= x y' + y x', x, y [m][ld]. */
-void batten_rfp_syr2k(const batten_rfp *b, size_t m, const void *x, size_t ldx, const void *y, size_t ldy);
-
 /* 1-norm; sums [n] is scratch. */
 double batten_rfp_norm1(const batten_rfp *b, double *sums);
 
 /* B := L with B = L L'. Progress between blocks. SINGULAR: the leading minor of order *failed is not positive. */
 batten_status batten_rfp_cholesky(batten_context *ctx, const batten_rfp *b, size_t *failed);
 
-/* Row of the smallest diagonal entry of the factor (or of B). */
-size_t batten_rfp_weakest(const batten_rfp *b);
+/* Row of the smallest pivot of a factored B; *ratio: that pivot over the largest. */
+size_t batten_rfp_weakest(const batten_rfp *b, double *ratio);
 
 /* x := L^-1 x and x := L^-T x for m columns, x [m][ldx] in B's precision. */
 void batten_rfp_forward(const batten_rfp *b, size_t m, void *x, size_t ldx);

@@ -234,7 +234,7 @@ static double norm_max(size_t n, const double *x) {
 static batten_status residual(const batten_saddle *s, const double *f, const double *x, double *r) {
   size_t n = s->matrix.n, k = s->matrix.k;
   const double *p = s->matrix.p;
-  batten_status st = batten_saddle_product(s, false, x, r);
+  batten_status st = batten_saddle_product(s, "residual", false, 1, x, r);
   if (st < 0) return st;
   for (size_t c = 0; c < k; c++) {
     double sum = 0;
@@ -252,7 +252,7 @@ static batten_status residual(const batten_saddle *s, const double *f, const dou
 static batten_status attainable(const batten_saddle *s, const double *f, const double *x, double f_norm,
                                 double *scratch, double *out) {
   size_t n = s->matrix.n, k = s->matrix.k;
-  batten_status st = batten_saddle_product(s, true, x, scratch);
+  batten_status st = batten_saddle_product(s, "residual", true, 1, x, scratch);
   if (st < 0) return st;
   for (size_t c = 0; c < k; c++)
     for (size_t i = 0; i < n; i++) scratch[i] += fabs(s->matrix.p[i + c * n] * x[n + c]);

@@ -77,13 +77,15 @@ batten_status batten_saddle_walk(const batten_saddle *s, const char *phase, cons
 /* Finds the power of two that brings a few probed columns of K to size 1. */
 batten_status batten_saddle_probe_scale(batten_saddle *s);
 
-/* y = K x (or |K| |x|), entries computed anew, same bits for any thread count. Bytes: product_bytes. */
-size_t batten_saddle_product_bytes(size_t n);
-batten_status batten_saddle_product(const batten_saddle *s, bool absolute, const double *x, double *y);
+/* y = K x (or |K| |x|) for m columns, x and y [m][N]; entries computed anew, same bits for any thread count. Bytes:
+ * product_bytes. */
+size_t batten_saddle_product_bytes(size_t n, size_t m);
+batten_status batten_saddle_product(const batten_saddle *s, const char *phase, bool absolute, size_t m,
+                                    const double *x, double *y);
 
 /* Bytes that a solve takes beside the factor: its vectors, and the product of a residual. */
 static inline size_t batten_saddle_solve_bytes(size_t n, size_t k) {
-  return 3 * (n + k) * sizeof(double) + batten_saddle_product_bytes(n);
+  return 3 * (n + k) * sizeof(double) + batten_saddle_product_bytes(n, 1);
 }
 
 /* ---- project.c ---- */

@@ -152,52 +152,62 @@ batten_status batten_saddle_probe_scale(batten_saddle *s) {
 /* ---- Product with fresh entries ---- */
 
 typedef struct product {
-  const double *x; /* [stride], zero beyond n */
-  double *sums;    /* [workers][stride] */
+  size_t m;
+  const double *x; /* [m][stride], zero beyond n */
+  double *sums;    /* [workers][m][stride] */
   size_t stride;
   bool absolute;
 } product;
 
 static size_t padded(size_t n) { return n + LANES; }
 
+/* y_row += column x and returns column' x_row, rows a multiple of LANES. */
+static double multiply_column(size_t rows, const double *column, double x, const double *x_row, double *y_row) {
+  double dot[LANES] = {0};
+  for (size_t i = 0; i < rows; i += LANES)
+    for (size_t l = 0; l < LANES; l++) {
+      y_row[i + l] += column[i + l] * x;
+      dot[l] += column[i + l] * x_row[i + l];
+    }
+  return ((dot[0] + dot[4]) + (dot[1] + dot[5])) + ((dot[2] + dot[6]) + (dot[3] + dot[7]));
+}
+
 /* y_row += tile x_col, and y_col += tile' x_row unless the tile lies on the diagonal. */
 static void multiply_tile(void *arg, size_t worker, const batten_saddle_tile *t) {
   const product *p = arg;
   size_t rows = (t->rows + LANES - 1) / LANES * LANES;
-  const double *x_row = p->x + t->row0, *x_col = p->x + t->col0;
-  double *y_row = p->sums + worker * p->stride + t->row0, *y_col = p->sums + worker * p->stride + t->col0;
   for (size_t j = 0; j < t->cols; j++) {
-    double *restrict column = t->data + j * t->ld;
+    double *column = t->data + j * t->ld;
     for (size_t i = t->rows; i < rows; i++) column[i] = 0;
-    if (p->absolute)
-      for (size_t i = 0; i < rows; i++) column[i] = fabs(column[i]);
-    double x = x_col[j], dot[LANES] = {0};
-    for (size_t i = 0; i < rows; i += LANES)
-      for (size_t l = 0; l < LANES; l++) {
-        y_row[i + l] += column[i + l] * x;
-        dot[l] += column[i + l] * x_row[i + l];
-      }
-    if (t->row0 != t->col0)
-      y_col[j] += ((dot[0] + dot[4]) + (dot[1] + dot[5])) + ((dot[2] + dot[6]) + (dot[3] + dot[7]));
+    for (size_t i = 0; p->absolute && i < rows; i++) column[i] = fabs(column[i]);
+    for (size_t v = 0; v < p->m; v++) {
+      const double *x = p->x + v * p->stride;
+      double *y = p->sums + (worker * p->m + v) * p->stride;
+      double dot = multiply_column(rows, column, x[t->col0 + j], x + t->row0, y + t->row0);
+      if (t->row0 != t->col0) y[t->col0 + j] += dot;
+    }
   }
 }
 
-size_t batten_saddle_product_bytes(size_t n) {
-  return (workers(n) + 1) * padded(n) * sizeof(double) + batten_saddle_walk_bytes(n);
+size_t batten_saddle_product_bytes(size_t n, size_t m) {
+  return (workers(n) + 1) * m * padded(n) * sizeof(double) + batten_saddle_walk_bytes(n);
 }
 
-batten_status batten_saddle_product(const batten_saddle *s, bool absolute, const double *x, double *y) {
-  size_t n = s->matrix.n, stride = padded(n);
-  double *block = batten_alloc_array(s->ctx, stride, (workers(n) + 1) * sizeof *block);
+batten_status batten_saddle_product(const batten_saddle *s, const char *phase, bool absolute, size_t m,
+                                    const double *x, double *y) {
+  size_t n = s->matrix.n, stride = padded(n), all = (workers(n) + 1) * m;
+  double *block = batten_alloc_array(s->ctx, stride, all * sizeof *block);
   if (!block) return BATTEN_E_NOMEM;
-  memset(block, 0, (workers(n) + 1) * stride * sizeof *block);
-  product p = {.x = block, .sums = block + stride, .stride = stride, .absolute = absolute};
-  for (size_t i = 0; i < n; i++) block[i] = absolute ? fabs(x[i]) : x[i];
-  batten_status st = batten_saddle_walk(s, "residual", NULL, false, multiply_tile, &p);
+  memset(block, 0, all * stride * sizeof *block);
+  product p = {.m = m, .x = block, .sums = block + m * stride, .stride = stride, .absolute = absolute};
+  for (size_t v = 0; v < m; v++)
+    for (size_t i = 0; i < n; i++) block[v * stride + i] = absolute ? fabs(x[v * n + i]) : x[v * n + i];
+  batten_status st = batten_saddle_walk(s, phase, NULL, false, multiply_tile, &p);
   if (st < 0) goto done;
-  memset(y, 0, n * sizeof *y);
+  memset(y, 0, m * n * sizeof *y);
   for (size_t worker = 0; worker < workers(n); worker++)
-    for (size_t i = 0; i < n; i++) y[i] += p.sums[worker * stride + i];
+    for (size_t v = 0; v < m; v++)
+      for (size_t i = 0; i < n; i++) y[v * n + i] += p.sums[(worker * m + v) * stride + i];
 done:
   batten_free(s->ctx, block);
   return st;
