@@ -12,7 +12,7 @@
 
 static const double BOX_MARGIN = 0.25;  /* of the seeds' largest extent, on every side */
 static const double CELL_SPACING = 0.7; /* of the median distance between neighbouring seeds */
-static const double CELL_LARGEST = 1.0 / 30, CELL_SMALLEST = 1.0 / 200; /* of the diagonal of the seeds' box */
+static const double CELL_LARGEST = 1.0 / 60, CELL_SMALLEST = 1.0 / 200; /* of the diagonal of the seeds' box */
 static const double CUBE_EDGES = 1.25; /* lattice cubes are wider than the edges: they give 3.6 vertices for each */
 
 batten_polygonize_options batten_polygonize_options_default(void) {

@@ -69,7 +69,7 @@ BATTEN_API batten_status batten_mesh_self_intersections(batten_context *ctx, con
 typedef struct batten_polygonize_options {
   size_t struct_size;
   double cell; /* edge length aimed at, caller's unit. 0 = 0.7 of the median distance of seeds to their nearest
-                  neighbour, but between 1/200 and 1/30 of the diagonal of the seeds' box. Parts of the solid and gaps
+                  neighbour, but between 1/200 and 1/60 of the diagonal of the seeds' box. Parts of the solid and gaps
                   thinner than about one cell may be lost. Default 0. */
   double lower[3], upper[3]; /* clip box; all 0 = the seeds' box, each side moved out by 25 % of its largest extent.
                                 The field is asked for within it only, but for Newton steps of a third of a cell and
