@@ -211,7 +211,8 @@ static batten_status get_carrier(bx_json *j, const json_t *object, unsigned n, u
 static batten_status load_solid_members(bx_json *j, const json_t *object, unsigned depth, batten_solid **out) {
   unsigned n = 0;
   int64_t sign = 0;
-  double lower[3], upper[3];
+  size_t count = 0;
+  double lower[3], upper[3], *points = NULL;
   batten_spline *spline = NULL;
   batten_carrier *carrier = NULL;
   batten_status st = get_dimension(j, object, &n);
@@ -220,7 +221,10 @@ static batten_status load_solid_members(bx_json *j, const json_t *object, unsign
   if (st == BATTEN_OK) st = bx_get_numbers(j, object, "upper", n, upper);
   if (st == BATTEN_OK) st = get_spline(j, object, &spline);
   if (st == BATTEN_OK) st = get_carrier(j, object, n, depth, &carrier);
-  if (st == BATTEN_OK) st = explain(j, batten_solid_create(j->ctx, spline, carrier, (int)sign, lower, upper, out));
+  if (st == BATTEN_OK && json_object_get(object, "points")) st = bx_get_rows(j, object, "points", n, &count, &points);
+  if (st == BATTEN_OK)
+    st = explain(j, batten_solid_create(j->ctx, spline, carrier, (int)sign, lower, upper, count, points, out));
+  batten_free(j->ctx, points);
   batten_spline_free(spline);
   batten_carrier_free(carrier);
   return st;

@@ -3,7 +3,7 @@
  * {"batten": "solid", "version": 1, "n": 3, "sign": 1, "lower": [...], "upper": [...],
  *  "spline": {"n", "m", "origin", "scale", "polynomial", "gradient_at", "gradient_coefficients", "coefficients",
  *             "centers"},
- *  "carrier": {"kind": "ball", "center": [...], "radius": ...}}
+ *  "carrier": {"kind": "ball", "center": [...], "radius": ...}, "points": [...]}
  * {"batten": "carrier", "version": 1, "n": 3, "carrier": {...}}
  *
  * Written straight to the file, number by number, each in the shortest text that reads back to the same bits: a
@@ -167,6 +167,10 @@ static void put_solid_members(bx_writer *w, const batten_solid *solid) {
   put_carrier(w, batten_solid_carrier(solid));
   bx_put_text(w, ",\n\"spline\": ");
   put_spline(w, batten_solid_spline(solid));
+  size_t count;
+  const double *points = batten_solid_points(solid, &count);
+  bx_put_text(w, ",\n\"points\": ");
+  put_rows(w, points, count, n);
 }
 
 static batten_status check_path(batten_context *ctx, const char *path, const void *what, const char *name) {

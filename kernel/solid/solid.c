@@ -86,42 +86,64 @@ static size_t keep_surface_points(unsigned n, size_t count, const double *f, con
   return kept;
 }
 
-batten_status batten_solid_create(batten_context *ctx, batten_spline *spline, batten_carrier *carrier, int sign,
-                                  const double *lower, const double *upper, batten_solid **out) {
-  if (!out) return batten_fail(ctx, BATTEN_E_INVALID, "out: NULL; give the place for the solid");
-  if (!spline || !carrier)
-    return batten_fail(ctx, BATTEN_E_INVALID, "%s: NULL; give one", spline ? "carrier" : "spline");
+/* The points of a solid of which only the centres are known. */
+static batten_status guess_points(batten_context *ctx, batten_solid *s) {
+  double *f = batten_alloc_array(ctx, s->count, sizeof *f), *u = batten_alloc_array(ctx, s->count, sizeof *u);
+  batten_status st = f && u ? BATTEN_OK : BATTEN_E_NOMEM;
+  if (st >= 0) st = batten_solid_evaluate(ctx, s, s->count, s->points, f, NULL, NULL);
+  if (st >= 0) st = batten_spline_evaluate(ctx, s->spline, s->count, s->points, u, NULL, NULL);
+  if (st >= 0) s->count = keep_surface_points(s->n, s->count, f, u, s->points);
+  batten_free(ctx, f);
+  batten_free(ctx, u);
+  return st;
+}
+
+static batten_status check_parts(batten_context *ctx, const batten_spline_parts *parts, const batten_carrier *carrier,
+                                 int sign, const double *lower, const double *upper, size_t point_count,
+                                 const double *points) {
+  unsigned n = parts->n, of_carrier = batten_carrier_field(carrier).dimension;
+  size_t bytes;
   if (sign != 1 && sign != -1) return batten_fail(ctx, BATTEN_E_INVALID, "sign: %d; give 1 or -1", sign);
   if (!lower || !upper)
     return batten_fail(ctx, BATTEN_E_INVALID, "%s: NULL; give the box", lower ? "upper" : "lower");
-  batten_spline_parts parts;
-  batten_spline_get_parts(spline, &parts);
-  unsigned n = parts.n, of_carrier = batten_carrier_field(carrier).dimension;
   if (of_carrier != n)
     return batten_fail(ctx, BATTEN_E_INVALID, "carrier: of dimension %u, the spline's is %u", of_carrier, n);
   for (unsigned i = 0; i < n; i++)
     if (!isfinite(lower[i]) || !isfinite(upper[i]) || lower[i] > upper[i])
       return batten_fail(ctx, BATTEN_E_INVALID, "lower[%u], upper[%u]: %g, %g; give finite bounds in order", i, i,
                          lower[i], upper[i]);
+  if (!points) return BATTEN_OK;
+  if (point_count == 0)
+    return batten_fail(ctx, BATTEN_E_INVALID, "point_count: 0; give points on the surface, or NULL for the centres");
+  if (!batten_mul3(point_count, n, sizeof(double), &bytes))
+    return batten_fail(ctx, BATTEN_E_TOO_LARGE, "point_count: %zu; too many", point_count);
+  size_t bad = batten_first_nonfinite(point_count * n, points);
+  if (bad < point_count * n)
+    return batten_fail(ctx, BATTEN_E_INVALID, "points[%zu]: coordinate %zu is %g; remove the point", bad / n, bad % n,
+                       points[bad]);
+  return BATTEN_OK;
+}
+
+batten_status batten_solid_create(batten_context *ctx, batten_spline *spline, batten_carrier *carrier, int sign,
+                                  const double *lower, const double *upper, size_t point_count, const double *points,
+                                  batten_solid **out) {
+  if (!out) return batten_fail(ctx, BATTEN_E_INVALID, "out: NULL; give the place for the solid");
+  if (!spline || !carrier)
+    return batten_fail(ctx, BATTEN_E_INVALID, "%s: NULL; give one", spline ? "carrier" : "spline");
   batten_solid *s = NULL;
-  double *f = NULL, *u = NULL;
-  batten_status st = batten_solid_new(ctx, spline, carrier, sign, parts.count, parts.centers, lower, upper, &s);
-  if (st < 0) return st;
-  st = BATTEN_E_NOMEM;
-  f = batten_alloc_array(ctx, parts.count, sizeof *f);
-  u = batten_alloc_array(ctx, parts.count, sizeof *u);
-  if (!f || !u) goto done;
-  st = batten_solid_evaluate(ctx, s, s->count, s->points, f, NULL, NULL);
-  if (st >= 0) st = batten_spline_evaluate(ctx, spline, s->count, s->points, u, NULL, NULL);
-  if (st < 0) goto done;
-  s->count = keep_surface_points(n, s->count, f, u, s->points);
+  batten_spline_parts parts;
+  batten_spline_get_parts(spline, &parts);
+  batten_status st = check_parts(ctx, &parts, carrier, sign, lower, upper, point_count, points);
+  if (st >= 0)
+    st = batten_solid_new(ctx, spline, carrier, sign, points ? point_count : parts.count,
+                          points ? points : parts.centers, lower, upper, &s);
+  if (st >= 0 && !points) st = guess_points(ctx, s);
+  if (st < 0) {
+    batten_solid_free(s);
+    return st;
+  }
   *out = s;
-  s = NULL;
-done:
-  batten_free(ctx, f);
-  batten_free(ctx, u);
-  batten_solid_free(s);
-  return st;
+  return BATTEN_OK;
 }
 
 /* ---- another carrier ----------------------------------------------------------------------------- */

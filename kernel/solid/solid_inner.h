@@ -18,7 +18,7 @@ struct batten_solid {
   double *points; /* [count][n] */
 };
 
-/* As batten_solid_create, with the points on the surface named (copied). */
+/* batten_solid_create behind its checks. */
 batten_status batten_solid_new(batten_context *ctx, batten_spline *spline, batten_carrier *carrier, int sign,
                                size_t count, const double *points, const double *lower, const double *upper,
                                batten_solid **out);

@@ -51,7 +51,7 @@ static batten_status make_solid(batten_context *ctx, unsigned n, bool gradients,
     d.gradients = g;
   }
   if (st >= 0) st = batten_spline_fit(ctx, &d, &o, &spline, NULL);
-  if (st >= 0) st = batten_solid_create(ctx, spline, carrier, -1, lower, upper, out);
+  if (st >= 0) st = batten_solid_create(ctx, spline, carrier, -1, lower, upper, 0, NULL, out);
   batten_spline_free(spline);
   return st;
 }
@@ -136,6 +136,31 @@ static void test_solid(batten_context *ctx, scratch *s, unsigned n, bool gradien
   batten_carrier_free(carrier);
 }
 
+static bool same_points(const batten_solid *a, const batten_solid *b) {
+  size_t of_a, of_b;
+  const double *at_a = batten_solid_points(a, &of_a), *at_b = batten_solid_points(b, &of_b);
+  return of_a == of_b && !memcmp(at_a, at_b, of_a * batten_solid_dimension(a) * sizeof *at_a);
+}
+
+/* The points of a deformed solid are none of its spline's centres, so that nobody could guess them. */
+static void test_points(batten_context *ctx, scratch *s) {
+  batten_carrier *first = NULL, *second = NULL;
+  batten_solid *solid = NULL, *moved = NULL, *back = NULL;
+  T_OK(batten_carrier_ball(ctx, 3, (double[]){0, 0, 0}, 0.9, &first), ctx);
+  T_OK(batten_carrier_ball(ctx, 3, (double[]){0.1, 0, 0}, 0.9, &second), ctx);
+  T_OK(make_solid(ctx, 3, false, first, &solid), ctx);
+  T_OK(batten_solid_with_carrier(ctx, solid, second, &moved), ctx);
+  T_CHECK(!same_points(solid, moved), "deforming moves the points");
+  T_OK(batten_save_solid(ctx, moved, scratch_file(s, "moved.json")), ctx);
+  T_OK(batten_load_solid(ctx, s->name, &back), ctx);
+  T_CHECK(back && same_points(moved, back), "the points on the surface have the same bits");
+  batten_solid_free(solid);
+  batten_solid_free(moved);
+  batten_solid_free(back);
+  batten_carrier_free(first);
+  batten_carrier_free(second);
+}
+
 static batten_status load_text(batten_context *ctx, const char *text, bool carrier) {
   bx_reader r;
   batten_solid *solid = NULL;
@@ -201,6 +226,8 @@ static void test_refused(batten_context *ctx) {
       {"{\"batten\": \"solid\", \"version\": 1, \"n\": 2, \"sign\": 0, \"lower\": [0, 0], \"upper\": [1, 1], " GOOD
            BALL,
        "solid: sign: 0", false},
+      {HEAD GOOD "\"points\": [[0, 0], [1]], " BALL, "solid.points[1]: 1 numbers, where 2 are expected", false},
+      {HEAD GOOD "\"points\": [], " BALL, "solid: point_count: 0", false},
       {CARRIER "{\"kind\": \"callback\"}}", "carrier: kind 'callback' is not none, ball", true},
       {CARRIER "{\"kind\": \"ball\", \"center\": [0, 0]}}", "carrier: 'radius' is missing", true},
       {CARRIER "{\"kind\": \"ball\", \"center\": [0, 0], \"radius\": -1}}", "carrier: radius: -1", true},
@@ -334,6 +361,7 @@ int main(void) {
   }
   test_solid(ctx, &s, 2, true);
   test_solid(ctx, &s, 3, true);
+  test_points(ctx, &s);
   test_refused(ctx);
   test_depth(ctx);
   test_callback(ctx, &s);

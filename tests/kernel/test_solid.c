@@ -239,7 +239,7 @@ static void test_create(batten_context *ctx) {
   s = fit(ctx, 3, 200, NULL, &info);
   batten_solid_box(s, lower, upper);
   T_OK(batten_solid_create(ctx, batten_solid_spline(s), batten_solid_carrier(s), batten_solid_sign(s), lower, upper,
-                           &copy),
+                           0, NULL, &copy),
        ctx);
   scatter(3, 1.5, NULL);
   evaluate(ctx, s, values);
@@ -265,7 +265,8 @@ static void test_create(batten_context *ctx) {
   o.orientation = BATTEN_ORIENT_GIVEN;
   o.orient_data = BATTEN_ORIENT_DATA_PAIRS;
   T_OK(batten_solid_fit(ctx, 3, 200, points, &o, &s, &info), ctx);
-  T_OK(batten_solid_create(ctx, batten_solid_spline(s), batten_solid_carrier(s), 1, lower, upper, &copy), ctx);
+  T_OK(batten_solid_create(ctx, batten_solid_spline(s), batten_solid_carrier(s), 1, lower, upper, 0, NULL, &copy),
+       ctx);
   const double *kept = batten_solid_points(copy, &count);
   T_CHECK(count == 200 && !memcmp(kept, points, 200 * 3 * sizeof *kept), "pairs are not among the points");
   batten_solid_free(copy);

@@ -171,16 +171,28 @@ static void test_create(batten_context *ctx) {
   batten_spline *spline = batten_solid_spline(s);
   batten_carrier *carrier = batten_solid_carrier(s);
   const double lower[3] = {-1, -1, -1}, upper[3] = {1, 1, 1}, wild[3] = {1, NAN, 1};
-  T_STATUS(batten_solid_create(ctx, NULL, carrier, 1, lower, upper, &other), BATTEN_E_INVALID, ctx, "spline: NULL");
-  T_STATUS(batten_solid_create(ctx, spline, NULL, 1, lower, upper, &other), BATTEN_E_INVALID, ctx, "carrier: NULL");
-  T_STATUS(batten_solid_create(ctx, spline, carrier, 0, lower, upper, &other), BATTEN_E_INVALID, ctx, "sign: 0");
-  T_STATUS(batten_solid_create(ctx, spline, carrier, 1, upper, lower, &other), BATTEN_E_INVALID, ctx, "in order");
-  T_STATUS(batten_solid_create(ctx, spline, carrier, 1, lower, wild, &other), BATTEN_E_INVALID, ctx,
+  T_STATUS(batten_solid_create(ctx, NULL, carrier, 1, lower, upper, 0, NULL, &other), BATTEN_E_INVALID, ctx,
+           "spline: NULL");
+  T_STATUS(batten_solid_create(ctx, spline, NULL, 1, lower, upper, 0, NULL, &other), BATTEN_E_INVALID, ctx,
+           "carrier: NULL");
+  T_STATUS(batten_solid_create(ctx, spline, carrier, 0, lower, upper, 0, NULL, &other), BATTEN_E_INVALID, ctx,
+           "sign: 0");
+  T_STATUS(batten_solid_create(ctx, spline, carrier, 1, upper, lower, 0, NULL, &other), BATTEN_E_INVALID, ctx,
+           "in order");
+  T_STATUS(batten_solid_create(ctx, spline, carrier, 1, lower, wild, 0, NULL, &other), BATTEN_E_INVALID, ctx,
            "upper[1]: -1, nan");
-  T_STATUS(batten_solid_create(ctx, spline, carrier, 1, NULL, wild, &other), BATTEN_E_INVALID, ctx, "lower: NULL");
-  T_STATUS(batten_solid_create(ctx, spline, flat, 1, lower, upper, &other), BATTEN_E_INVALID, ctx,
+  T_STATUS(batten_solid_create(ctx, spline, carrier, 1, NULL, wild, 0, NULL, &other), BATTEN_E_INVALID, ctx,
+           "lower: NULL");
+  T_STATUS(batten_solid_create(ctx, spline, carrier, 1, lower, upper, 0, lower, &other), BATTEN_E_INVALID, ctx,
+           "point_count: 0");
+  T_STATUS(batten_solid_create(ctx, spline, carrier, 1, lower, upper, 1, wild, &other), BATTEN_E_INVALID, ctx,
+           "points[0]: coordinate 1 is nan");
+  T_STATUS(batten_solid_create(ctx, spline, carrier, 1, lower, upper, SIZE_MAX / 8, lower, &other),
+           BATTEN_E_TOO_LARGE, ctx, "point_count: ");
+  T_STATUS(batten_solid_create(ctx, spline, flat, 1, lower, upper, 0, NULL, &other), BATTEN_E_INVALID, ctx,
            "carrier: of dimension 2, the spline's is 3");
-  T_STATUS(batten_solid_create(ctx, spline, carrier, 1, lower, upper, NULL), BATTEN_E_INVALID, ctx, "out: NULL");
+  T_STATUS(batten_solid_create(ctx, spline, carrier, 1, lower, upper, 0, NULL, NULL), BATTEN_E_INVALID, ctx,
+           "out: NULL");
   T_STATUS(batten_solid_with_carrier(ctx, s, flat, &other), BATTEN_E_INVALID, ctx, "carrier: of dimension 2");
   T_STATUS(batten_solid_with_carrier(ctx, s, NULL, &other), BATTEN_E_INVALID, ctx, "carrier: NULL");
   T_STATUS(batten_solid_with_carrier(ctx, s, carrier, NULL), BATTEN_E_INVALID, ctx, "out: NULL");
@@ -229,7 +241,7 @@ static batten_status call_deform(batten_context *ctx, void *arg) {
   if (st >= 0) st = batten_carrier_ball(ctx, 2, (double[]){0.1, 0}, 1, &ball);
   if (st >= 0) st = batten_solid_with_carrier(ctx, s, ball, &moved);
   if (st >= 0) batten_solid_box(s, lower, upper);
-  if (st >= 0) st = batten_solid_create(ctx, batten_solid_spline(s), ball, -1, lower, upper, &copy);
+  if (st >= 0) st = batten_solid_create(ctx, batten_solid_spline(s), ball, -1, lower, upper, 0, NULL, &copy);
   batten_solid_free(s);
   batten_solid_free(moved);
   batten_solid_free(copy);

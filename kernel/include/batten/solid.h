@@ -61,9 +61,9 @@ typedef struct batten_solid_options {
   batten_orientation orientation;
   batten_orient_data orient_data;
   batten_orient_method orient_method;
-  size_t energy_points;          /* least-energy orientation works on at most so many points. Default 1000. */
-  double pair_distance;          /* off-surface distance over the local spacing, in (0, 1]. Default 0.5. */
-  size_t check_cells;            /* cells of the sign check's grid along the longest side, 8 .. 1000. Default 40. */
+  size_t energy_points; /* least-energy orientation works on at most so many points. Default 1000. */
+  double pair_distance; /* off-surface distance over the local spacing, in (0, 1]. Default 0.5. */
+  size_t check_cells;   /* cells of the sign check's grid along the longest side, 8 .. 1000. Default 40. */
   batten_spline_options spline;
 } batten_solid_options;
 BATTEN_API batten_solid_options batten_solid_options_default(void);
@@ -90,10 +90,10 @@ typedef struct batten_solid_info {
   double orient_lambda;               /* smoothing at which the estimated orientation was settled */
   batten_sign_check check;            /* of the first fit */
   batten_sign_check check_final;      /* of the solid that is returned */
-  double residual_max;  /* max |f(x_i)| / (max - min of the interpolated values; where a carrier runs through all
-                           points its own size in the box) */
-  double distance_max;  /* max |f(x_i)| / |grad f(x_i)|, caller's unit */
-  double spacing;       /* median distance to the nearest other point, caller's unit */
+  double residual_max;       /* max |f(x_i)| / (max - min of the interpolated values; where a carrier runs through all
+                                points its own size in the box) */
+  double distance_max;       /* max |f(x_i)| / |grad f(x_i)|, caller's unit */
+  double spacing;            /* median distance to the nearest other point, caller's unit */
   batten_spline_info spline; /* of the fit that is returned */
   double time_fit_s, time_check_s, time_orient_s;
 } batten_solid_info;
@@ -112,11 +112,12 @@ BATTEN_API batten_status batten_solid_fit(batten_context *ctx, unsigned n, size_
 BATTEN_API batten_status batten_solid_with_carrier(batten_context *ctx, const batten_solid *solid,
                                                    batten_carrier *carrier, batten_solid **out);
 
-/* From parts; sign is +1 or -1. spline and carrier are retained. lower/upper [n]: box of the data. The points of the
- * solid are the centres at which f vanishes to 1e-6; all centres when, after smoothing, under a quarter do. */
+/* From parts; sign is +1 or -1. spline and carrier are retained. lower/upper [n]: box of the data. points
+ * [point_count][n]: on the surface, at least one, copied. NULL (point_count is not read): the centres at which f
+ * vanishes to 1e-6; all centres when, after smoothing, under a quarter do. */
 BATTEN_API batten_status batten_solid_create(batten_context *ctx, batten_spline *spline, batten_carrier *carrier,
-                                             int sign, const double *lower, const double *upper,
-                                             batten_solid **out);
+                                             int sign, const double *lower, const double *upper, size_t point_count,
+                                             const double *points, batten_solid **out);
 
 /* f = sign (f_c - U), its gradient and Hessian; arrays as batten_spline_evaluate. Takes as much memory again as it
  * returns. */
