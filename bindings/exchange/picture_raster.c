@@ -44,12 +44,27 @@ static double edge(const float a[3], const float b[3], double x, double y) {
   return ((double)b[0] - a[0]) * (y - a[1]) - ((double)b[1] - a[1]) * (x - a[0]);
 }
 
+/* Without calls into libm, here and below: small triangles, tens of thousands in each of some 150 depth maps, cost
+ * little else. */
+static float least(float a, float b, float c) {
+  float d = a < b ? a : b;
+  return d < c ? d : c;
+}
+
+static float most(float a, float b, float c) {
+  float d = a > b ? a : b;
+  return d > c ? d : c;
+}
+
 /* First and one-past-last cell centre (i + 0.5) of the grid within [lower, upper]. */
 static void cells_within(double lower, double upper, size_t limit_first, size_t limit_end, size_t *first,
                          size_t *end) {
-  double a = ceil(lower - 0.5), b = floor(upper - 0.5) + 1;
-  *first = a <= (double)limit_first ? limit_first : a >= (double)limit_end ? limit_end : (size_t)a;
-  *end = b <= (double)limit_first ? limit_first : b >= (double)limit_end ? limit_end : (size_t)b;
+  double a = lower - 0.5, b = upper - 0.5, low = (double)limit_first, high = (double)limit_end;
+  *first = limit_first;
+  *end = limit_first;
+  if (a >= high || !(b >= low)) return;
+  if (a > low) *first = (size_t)a + ((double)(size_t)a < a);
+  *end = b >= high ? limit_end : (size_t)b + 1;
 }
 
 /* The grid that triangles are drawn to: screen of the camera or of a light. */
@@ -60,26 +75,28 @@ typedef struct target {
 } target;
 
 static void draw_triangle(const target *t, const float *a, const float *b, const float *c, uint32_t item) {
-  float low = fminf(a[1], fminf(b[1], c[1])), high = fmaxf(a[1], fmaxf(b[1], c[1]));
+  float low = least(a[1], b[1], c[1]), high = most(a[1], b[1], c[1]);
   if (high < (float)t->row_first || low > (float)t->row_end) return;
-  double area = edge(a, b, c[0], c[1]);
-  if (area == 0 || !isfinite(area)) return;
   size_t x0, x1, y0, y1;
-  cells_within(fminf(a[0], fminf(b[0], c[0])), fmaxf(a[0], fmaxf(b[0], c[0])), 0, t->width, &x0, &x1);
+  cells_within(least(a[0], b[0], c[0]), most(a[0], b[0], c[0]), 0, t->width, &x0, &x1);
   cells_within(low, high, t->row_first, t->row_end, &y0, &y1);
   if (x0 >= x1 || y0 >= y1) return;
+  double area = edge(a, b, c[0], c[1]);
+  if (area == 0 || !isfinite(area)) return;
   double sign = area < 0 ? -1 : 1, scale = sign / area;
   /* Edge functions, positive inside, and their steps along the row. */
   double step_a = -sign * ((double)c[1] - b[1]), step_b = -sign * ((double)a[1] - c[1]);
   double step_c = -sign * ((double)b[1] - a[1]);
+  double step_z = (step_a * a[2] + step_b * b[2] + step_c * c[2]) * scale;
   for (size_t y = y0; y < y1; y++) {
     double px = (double)x0 + 0.5, py = (double)y + 0.5;
     double ea = sign * edge(b, c, px, py), eb = sign * edge(c, a, px, py), ec = sign * edge(a, b, px, py);
+    double ez = (ea * a[2] + eb * b[2] + ec * c[2]) * scale;
     float *depth = t->depth + y * t->width;
-    for (size_t x = x0; x < x1; x++, ea += step_a, eb += step_b, ec += step_c) {
-      if (ea < 0 || eb < 0 || ec < 0) continue;
-      float z = (float)((ea * a[2] + eb * b[2] + ec * c[2]) * scale);
-      if (z <= depth[x]) continue;
+    for (size_t x = x0; x < x1; x++, ea += step_a, eb += step_b, ec += step_c, ez += step_z) {
+      float z = (float)ez;
+      /* & and not &&: one branch, for each by itself would be guessed wrong half of the time. */
+      if (!((ea >= 0) & (eb >= 0) & (ec >= 0) & (z > depth[x]))) continue;
       depth[x] = z;
       if (t->item) t->item[y * t->width + x] = item;
     }

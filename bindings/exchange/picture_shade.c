@@ -269,9 +269,8 @@ static float reached(const float *map, size_t size, const beam *b, const float p
   size_t i = (size_t)x, j = (size_t)y;
   float fx = x - (float)i, fy = y - (float)j;
   const float *m = map + j * size + i;
-  float a = m[0] <= depth ? 1 - fx : 0, c = m[size] <= depth ? 1 - fx : 0;
-  a += m[1] <= depth ? fx : 0;
-  c += m[size + 1] <= depth ? fx : 0;
+  float a = (float)(m[0] <= depth) * (1 - fx) + (float)(m[1] <= depth) * fx; /* no branches to be guessed wrong */
+  float c = (float)(m[size] <= depth) * (1 - fx) + (float)(m[size + 1] <= depth) * fx;
   return a + fy * (c - a);
 }
 
@@ -298,15 +297,16 @@ static void make_taps(float taps[TAPS][2]) {
 static void light_chunk(void *arg, size_t chunk) {
   shading *s = arg;
   size_t end = (chunk + 1) * CHUNK < s->total ? (chunk + 1) * CHUNK : s->total;
+  bool glossy = s->beams[s->beam_end - 1].glossy; /* the sky's beams come first */
   for (size_t i = chunk * CHUNK; i < end; i++) {
     point *p = &s->points[i];
-    float from[3], view[3];
+    float from[3], view[3] = {0};
     /* Off the surface by two texels, so that a beam does not stop at the triangle where it ends. */
-    for (size_t k = 0; k < 3; k++) {
-      from[k] = p->position[k] + p->normal[k] * (4 / (float)s->map);
-      view[k] = (float)(s->camera->back[k] * s->camera->distance) - p->position[k];
+    for (size_t k = 0; k < 3; k++) from[k] = p->position[k] + p->normal[k] * (4 / (float)s->map);
+    if (glossy) {
+      for (size_t k = 0; k < 3; k++) view[k] = (float)(s->camera->back[k] * s->camera->distance) - p->position[k];
+      normalize(view);
     }
-    normalize(view);
     for (size_t k = s->beam_first; k < s->beam_end; k++) {
       const beam *b = &s->beams[k];
       float cosine = dotf(p->normal, b->d);
@@ -318,9 +318,9 @@ static void light_chunk(void *arg, size_t chunk) {
       if (b->glossy) {
         float half[3] = {b->d[0] + view[0], b->d[1] + view[1], b->d[2] + view[2]};
         normalize(half);
-        float shine = fmaxf(0, dotf(half, p->normal)), fresnel = 1 - fmaxf(0, dotf(view, half));
+        float shine = fmaxf(0, dotf(half, p->normal)), away = 1 - fmaxf(0, dotf(view, half)), away2 = away * away;
         shine *= shine, shine *= shine, shine *= shine, shine *= shine, shine *= shine; /* power 32 */
-        p->gloss += part * cosine * shine * b->color[1] * (0.16f + 0.84f * powf(fresnel, 5));
+        p->gloss += part * cosine * shine * b->color[1] * (0.16f + 0.84f * away2 * away2 * away);
       }
     }
   }
