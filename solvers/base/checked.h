@@ -30,6 +30,13 @@ static inline size_t batten_first_nonfinite(size_t count, const double *values) 
   return i;
 }
 
+/* The power of two that brings |x| to [1, 2): multiplying by it is exact. x > 0 and finite; a subnormal x comes as near
+ * to 1 as a double can bring it. */
+static inline double batten_unit(double x) {
+  int exponent = ilogb(x);
+  return ldexp(1, -(exponent > -1022 ? exponent : -1022));
+}
+
 /* Refuses an options struct whose struct_size is not the library's: BATTEN_OK or BATTEN_E_INVALID. */
 static inline batten_status batten_check_struct(batten_context *ctx, const char *name, size_t given,
                                                 size_t expected) {

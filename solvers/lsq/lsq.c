@@ -1,10 +1,12 @@
 /* Dense least squares, see <batten/lsq.h>.
  *
- * Columns are scaled by powers of two to norm 1 first, so that rank and condition do not depend on units.
- *   normal  G = D (A'WA + T) D = R'R by syrk and Cholesky, then two steps x += D G^-1 D g with the gradient
- *           g = A'W (b - A x) - T x of the given data: the second step takes the squared condition's error away.
- *   QR      of [sqrt(W) A D; U D] with column pivoting, T = U'U by pivoted Cholesky.
- * Row-major A [m][n] is column-major A' [n][m]; X and gradients are kept column-major [n][nrhs] inside. */
+ * What comes in is brought to size 1 by powers of two, so that rank, condition and overflow do not depend on units:
+ *     S = sqrt(W) A D,  C = sqrt(W) B E,  T := D T D,   X = D Y E^-1
+ * Both methods then minimise |S Y - C|^2 + Y'T Y:
+ *   normal  G = S'S + T = R'R by syrk and Cholesky, then two steps y += G^-1 g with the gradient g = S'(C - S Y) - T
+ * Y: the second step takes the squared condition's error away. QR      of [S; U] with column pivoting, T = U'U by
+ * pivoted Cholesky. Row-major S [m][n] is column-major S' [n][m]; Y and gradients are kept column-major [n][nrhs]
+ * inside. */
 #include <batten/lsq.h>
 #include <float.h>
 #include <string.h>
@@ -24,34 +26,24 @@ batten_lsq_options batten_lsq_options_default(void) {
 typedef struct problem {
   batten_context *ctx;
   size_t m, n, nrhs;
-  const double *a, *b, *weights, *tension;
-  double *scale;    /* [n] D */
-  double *x;        /* [nrhs][n] */
-  double *residual; /* [m][nrhs] W (b - A x) */
-  double *gradient; /* [nrhs][n] */
+  double *a, *b, *tension; /* [m][n] S, [m][nrhs] C, [n][n] T or NULL */
+  double *scale, *unit;    /* [n] D, [nrhs] E */
+  double *y;               /* [nrhs][n] */
+  double *residual;        /* [m][nrhs] C - S Y */
+  double *gradient;        /* [nrhs][n] */
   batten_lsq_info info;
 } problem;
 
-static double weight(const problem *p, size_t i) { return p->weights ? p->weights[i] : 1; }
-
 /* ---- What both methods share ---- */
 
-/* gradient = A'W (b - A x) - T x; returns the weighted sum of squares of b - A x. */
-static double update_gradient(problem *p) {
+/* residual = C - S Y, gradient = S' residual - T Y. */
+static void update_gradient(problem *p) {
   size_t m = p->m, n = p->n, q = p->nrhs;
-  double sum = 0;
   if (m * q > 0) memcpy(p->residual, p->b, m * q * sizeof *p->residual);
-  if (n > 0) batten_la_gemm(D, 'T', 'N', q, m, n, -1, p->x, n, p->a, n, 1, p->residual, q);
-  for (size_t i = 0; i < m; i++)
-    for (size_t j = 0; j < q; j++) {
-      double *r = p->residual + i * q + j, weighted = weight(p, i) * *r;
-      sum += weighted * *r;
-      *r = weighted;
-    }
+  if (n > 0) batten_la_gemm(D, 'T', 'N', q, m, n, -1, p->y, n, p->a, n, 1, p->residual, q);
   memset(p->gradient, 0, n * q * sizeof *p->gradient);
   if (m > 0) batten_la_gemm(D, 'N', 'T', n, q, m, 1, p->a, n, p->residual, q, 0, p->gradient, n);
-  if (p->tension) batten_la_symm(D, 'L', 'L', n, q, -1, p->tension, n, p->x, n, 1, p->gradient, n);
-  return sum;
+  if (p->tension) batten_la_symm(D, 'L', 'L', n, q, -1, p->tension, n, p->y, n, 1, p->gradient, n);
 }
 
 static double largest(size_t count, const double *values) {
@@ -60,23 +52,41 @@ static double largest(size_t count, const double *values) {
   return norm;
 }
 
-/* D: powers of two that bring the columns of [sqrt(W) A; U] to size 1, from the largest entries (no squares, no
- * overflow). */
-static batten_status make_scale(problem *p) {
-  size_t m = p->m, n = p->n;
-  memset(p->scale, 0, n * sizeof *p->scale);
-  for (size_t i = 0; i < m; i++) {
-    double root = sqrt(weight(p, i));
-    for (size_t j = 0; j < n; j++) p->scale[j] = fmax(p->scale[j], root * fabs(p->a[i * n + j]));
+/* to [m][columns] := sqrt(W) from, times the powers of two scale [columns] that bring its columns to size 1; floor
+ * [columns] counts as an entry of the column (NULL = none). A column of zeros keeps scale 0. */
+static batten_status make_columns(problem *p, const char *name, size_t columns, const double *from,
+                                  const double *weights, const double *floor, double *to, double *scale) {
+  for (size_t j = 0; j < columns; j++) scale[j] = floor ? sqrt(floor[j * columns + j]) : 0;
+  for (size_t i = 0; i < p->m; i++) {
+    double root = weights ? sqrt(weights[i]) : 1;
+    for (size_t j = 0; j < columns; j++) {
+      to[i * columns + j] = root * from[i * columns + j];
+      scale[j] = fmax(scale[j], fabs(to[i * columns + j]));
+    }
   }
-  for (size_t j = 0; j < n; j++) {
-    double norm = p->scale[j];
-    if (p->tension) norm = fmax(norm, sqrt(p->tension[j * n + j]));
-    if (!(norm > 0))
-      return batten_fail(p->ctx, BATTEN_E_SINGULAR, "a: column %zu is zero; drop it or add tension", j);
-    p->scale[j] = ldexp(1, -ilogb(norm));
+  for (size_t j = 0; j < columns; j++) {
+    if (!(scale[j] <= DBL_MAX))
+      return batten_fail(p->ctx, BATTEN_E_INVALID,
+                         "%s: column %zu times the roots of the weights overflows; choose "
+                         "a larger unit",
+                         name, j);
+    if (scale[j] > 0) scale[j] = batten_unit(scale[j]);
   }
+  for (size_t i = 0; i < p->m; i++)
+    for (size_t j = 0; j < columns; j++) to[i * columns + j] *= scale[j];
   return BATTEN_OK;
+}
+
+static batten_status make_problem(problem *p, const double *a, const double *b, const batten_lsq_options *o) {
+  size_t n = p->n;
+  batten_status st = make_columns(p, "a", n, a, o->weights, o->tension, p->a, p->scale);
+  if (st == BATTEN_OK) st = make_columns(p, "b", p->nrhs, b, o->weights, NULL, p->b, p->unit);
+  for (size_t j = 0; j < n && st == BATTEN_OK; j++)
+    if (p->scale[j] == 0)
+      st = batten_fail(p->ctx, BATTEN_E_SINGULAR, "a: column %zu is zero; drop it or add tension", j);
+  for (size_t i = 0; p->tension && i < n; i++)
+    for (size_t j = 0; j < n; j++) p->tension[i * n + j] = p->scale[i] * o->tension[i * n + j] * p->scale[j];
+  return st;
 }
 
 static batten_status rank_deficient(const problem *p, size_t column) {
@@ -86,30 +96,14 @@ static batten_status rank_deficient(const problem *p, size_t column) {
 
 /* ---- Normal equations ---- */
 
-/* g [n][n] upper := D (A'WA + T) D. */
-static batten_status make_normal(const problem *p, double *g) {
-  size_t m = p->m, n = p->n;
-  double *scaled = batten_alloc_array(p->ctx, m * n, sizeof *scaled);
-  if (!scaled) return BATTEN_E_NOMEM;
-  for (size_t i = 0; i < m; i++) {
-    double root = sqrt(weight(p, i));
-    for (size_t j = 0; j < n; j++) scaled[i * n + j] = root * p->a[i * n + j] * p->scale[j];
-  }
-  batten_la_syrk(D, 'U', 'N', n, m, 1, scaled, n, 0, g, n);
-  for (size_t j = 0; p->tension && j < n; j++)
-    for (size_t i = 0; i <= j; i++) g[i + j * n] += p->scale[i] * p->tension[i + j * n] * p->scale[j];
-  batten_free(p->ctx, scaled);
-  return BATTEN_OK;
-}
-
 static batten_status solve_normal(problem *p) {
   size_t n = p->n;
   p->info.method = BATTEN_LSQ_NORMAL;
   double *g = batten_alloc_array(p->ctx, n * n, sizeof *g);
   if (!g) return BATTEN_E_NOMEM;
-  batten_status st = make_normal(p, g);
-  if (st < 0) goto done;
-  st = batten_progress(p->ctx, "least squares", 0.5);
+  batten_la_syrk(D, 'U', 'N', n, p->m, 1, p->a, n, 0, g, n);
+  for (size_t q = 0; p->tension && q < n * n; q++) g[q] += p->tension[q];
+  batten_status st = batten_progress(p->ctx, "least squares", 0.5);
   if (st < 0) goto done;
   size_t failed = batten_la_potrf(D, 'U', n, g, n);
   if (failed > 0) {
@@ -125,14 +119,11 @@ static batten_status solve_normal(problem *p) {
     st = rank_deficient(p, weakest);
     goto done;
   }
-  memset(p->x, 0, n * p->nrhs * sizeof *p->x);
   for (int step = 0; step < 2; step++) {
     update_gradient(p);
-    double *d = p->gradient;
-    for (size_t q = 0; q < n * p->nrhs; q++) d[q] *= p->scale[q % n];
-    batten_la_trsm(D, 'L', 'U', 'T', n, p->nrhs, 1, g, n, d, n);
-    batten_la_trsm(D, 'L', 'U', 'N', n, p->nrhs, 1, g, n, d, n);
-    for (size_t q = 0; q < n * p->nrhs; q++) p->x[q] += p->scale[q % n] * d[q];
+    batten_la_trsm(D, 'L', 'U', 'T', n, p->nrhs, 1, g, n, p->gradient, n);
+    batten_la_trsm(D, 'L', 'U', 'N', n, p->nrhs, 1, g, n, p->gradient, n);
+    for (size_t q = 0; q < n * p->nrhs; q++) p->y[q] += p->gradient[q];
   }
 done:
   batten_free(p->ctx, g);
@@ -171,16 +162,15 @@ done:
   return st;
 }
 
-/* stacked [n][rows] := [sqrt(W) A; U] D and right [nrhs][rows] := [sqrt(W) b; 0]. */
+/* stacked [n][rows] := [S; U] and right [nrhs][rows] := [C; 0]. */
 static void stack(const problem *p, const double *u, size_t rank, size_t rows, double *stacked, double *right) {
   size_t m = p->m, n = p->n;
   for (size_t i = 0; i < m; i++) {
-    double root = sqrt(weight(p, i));
-    for (size_t j = 0; j < n; j++) stacked[i + j * rows] = root * p->a[i * n + j] * p->scale[j];
-    for (size_t q = 0; q < p->nrhs; q++) right[i + q * rows] = root * p->b[i * p->nrhs + q];
+    for (size_t j = 0; j < n; j++) stacked[i + j * rows] = p->a[i * n + j];
+    for (size_t q = 0; q < p->nrhs; q++) right[i + q * rows] = p->b[i * p->nrhs + q];
   }
   for (size_t j = 0; j < n; j++)
-    for (size_t i = 0; i < rank; i++) stacked[m + i + j * rows] = u[i + j * n] * p->scale[j];
+    for (size_t i = 0; i < rank; i++) stacked[m + i + j * rows] = u[i + j * n];
   for (size_t q = 0; q < p->nrhs; q++) memset(right + m + q * rows, 0, rank * sizeof *right);
 }
 
@@ -223,7 +213,7 @@ static batten_status solve_qr(problem *p) {
   if (st < 0) goto done;
   batten_la_trsm(D, 'L', 'U', 'N', n, p->nrhs, 1, stacked, rows, right, rows);
   for (size_t q = 0; q < p->nrhs; q++)
-    for (size_t j = 0; j < n; j++) p->x[pivots[j] + q * n] = p->scale[pivots[j]] * right[j + q * rows];
+    for (size_t j = 0; j < n; j++) p->y[pivots[j] + q * n] = right[j + q * rows];
 done:
   batten_free(p->ctx, pivots);
   batten_free(p->ctx, tau);
@@ -261,7 +251,8 @@ static batten_status check_tension(batten_context *ctx, size_t n, const double *
   return BATTEN_OK;
 }
 
-static batten_status check(batten_context *ctx, const problem *p, const batten_lsq_options *o, const double *x) {
+static batten_status check(batten_context *ctx, const problem *p, const double *a, const double *b,
+                           const batten_lsq_options *o, const double *x) {
   size_t sum, product;
   batten_status st = batten_check_struct(ctx, "batten_lsq_options", o->struct_size, sizeof *o);
   if (st < 0) return st;
@@ -271,16 +262,16 @@ static batten_status check(batten_context *ctx, const problem *p, const batten_l
       !batten_mul3(sum, sum, sizeof(double), &product))
     return batten_fail(ctx, BATTEN_E_TOO_LARGE, "m, n, nrhs: %zu, %zu, %zu exceed LAPACK's integers", p->m, p->n,
                        p->nrhs);
-  if (p->m < p->n && !p->tension)
+  if (p->m < p->n && !o->tension)
     return batten_fail(ctx, BATTEN_E_INVALID, "m: %zu rows for %zu unknowns; add rows or tension", p->m, p->n);
   if (!x && p->n * p->nrhs > 0) return batten_fail(ctx, BATTEN_E_INVALID, "x: NULL");
-  st = check_finite(ctx, "a", p->m, p->n, p->a);
-  if (st == BATTEN_OK) st = check_finite(ctx, "b", p->m, p->nrhs, p->b);
-  if (st == BATTEN_OK && p->tension) st = check_tension(ctx, p->n, p->tension);
-  for (size_t i = 0; st == BATTEN_OK && p->weights && i < p->m; i++)
-    if (!(p->weights[i] >= 0 && p->weights[i] <= DBL_MAX))
+  st = check_finite(ctx, "a", p->m, p->n, a);
+  if (st == BATTEN_OK) st = check_finite(ctx, "b", p->m, p->nrhs, b);
+  if (st == BATTEN_OK && o->tension) st = check_tension(ctx, p->n, o->tension);
+  for (size_t i = 0; st == BATTEN_OK && o->weights && i < p->m; i++)
+    if (!(o->weights[i] >= 0 && o->weights[i] <= DBL_MAX))
       st = batten_fail(ctx, BATTEN_E_INVALID, "opt.weights[%zu]: %g; must be finite and not negative", i,
-                       p->weights[i]);
+                       o->weights[i]);
   return st;
 }
 
@@ -291,45 +282,75 @@ static batten_status solve(problem *p, batten_lsq_method method) {
   return method == BATTEN_LSQ_AUTO && poor ? solve_qr(p) : st;
 }
 
+/* y := X, in the caller's units, and the figures about it; before: the largest gradient of each right side at 0. */
+static batten_status finish(problem *p, const double *before) {
+  size_t n = p->n, nrhs = p->nrhs;
+  update_gradient(p);
+  for (size_t q = 0; q < nrhs; q++) {
+    double gradient = largest(n, p->gradient + q * n), unit = p->unit[q] > 0 ? p->unit[q] : 1;
+    p->info.gradient_norm = fmax(p->info.gradient_norm, before[q] > 0 ? gradient / before[q] : gradient);
+    for (size_t i = 0; i < p->m; i++)
+      p->info.residual_norm = hypot(p->info.residual_norm, p->residual[i * nrhs + q] / unit);
+    for (size_t j = 0; j < n; j++) {
+      double *y = p->y + j + q * n;
+      *y = *y / unit * p->scale[j];
+      if (!(fabs(*y) <= DBL_MAX))
+        return batten_fail(p->ctx, BATTEN_E_INVALID, "x[%zu][%zu]: overflows; choose a larger unit for b", j, q);
+    }
+  }
+  return BATTEN_OK;
+}
+
+static batten_status allocate(problem *p, bool tension, double **before) {
+  size_t m = p->m, n = p->n, nrhs = p->nrhs;
+  struct {
+    double **array;
+    size_t count;
+  } arrays[] = {{&p->a, m * n},           {&p->b, m * nrhs},        {&p->scale, n},
+                {&p->unit, nrhs},         {&p->y, n * nrhs},        {before, nrhs},
+                {&p->residual, m * nrhs}, {&p->gradient, n * nrhs}, {&p->tension, tension ? n * n : 0}};
+  for (size_t i = 0; i + !tension < sizeof arrays / sizeof *arrays; i++) {
+    *arrays[i].array = batten_alloc_array(p->ctx, arrays[i].count, sizeof(double));
+    if (!*arrays[i].array) return BATTEN_E_NOMEM;
+  }
+  return BATTEN_OK;
+}
+
 batten_status batten_lsq_solve(batten_context *ctx, size_t m, size_t n, size_t nrhs, const double *a, const double *b,
                                const batten_lsq_options *opt, double *x, batten_lsq_info *info) {
   if (!ctx) return BATTEN_E_INVALID;
   batten_lsq_options o = opt ? *opt : batten_lsq_options_default();
-  problem p = {.ctx = ctx, .m = m, .n = n, .nrhs = nrhs, .a = a, .b = b, .weights = o.weights, .tension = o.tension};
-  double start = batten_now();
-  batten_status st = check(ctx, &p, &o, x);
+  problem p = {.ctx = ctx, .m = m, .n = n, .nrhs = nrhs};
+  double start = batten_now(), *before = NULL;
+  batten_status st = check(ctx, &p, a, b, &o, x);
   if (st < 0) return st;
 
-  st = BATTEN_E_NOMEM;
-  p.scale = batten_alloc_array(ctx, n, sizeof *p.scale);
-  if (!p.scale) goto done;
-  p.x = batten_alloc_array(ctx, n * nrhs, sizeof *p.x);
-  if (!p.x) goto done;
-  p.gradient = batten_alloc_array(ctx, n * nrhs, sizeof *p.gradient);
-  if (!p.gradient) goto done;
-  p.residual = batten_alloc_array(ctx, m * nrhs, sizeof *p.residual);
-  if (!p.residual) goto done;
+  st = allocate(&p, o.tension != NULL, &before);
+  if (st < 0) goto done;
   st = batten_progress(ctx, "least squares", 0);
   if (st < 0) goto done;
-  st = make_scale(&p);
+  st = make_problem(&p, a, b, &o);
   if (st < 0) goto done;
-  memset(p.x, 0, n * nrhs * sizeof *p.x);
+  memset(p.y, 0, n * nrhs * sizeof *p.y);
   update_gradient(&p);
-  double unit = largest(n * nrhs, p.gradient);
+  for (size_t q = 0; q < nrhs; q++) before[q] = largest(n, p.gradient + q * n);
   st = solve(&p, o.method);
   if (st < 0) goto done;
-
-  p.info.residual_norm = sqrt(update_gradient(&p));
-  double gradient = largest(n * nrhs, p.gradient);
-  p.info.gradient_norm = unit > 0 ? gradient / unit : gradient;
+  st = finish(&p, before);
+  if (st < 0) goto done;
   for (size_t i = 0; i < n; i++)
-    for (size_t q = 0; q < nrhs; q++) x[i * nrhs + q] = p.x[i + q * n];
+    for (size_t q = 0; q < nrhs; q++) x[i * nrhs + q] = p.y[i + q * n];
   p.info.time_s = batten_now() - start;
   if (info) *info = p.info;
 done:
+  batten_free(ctx, p.a);
+  batten_free(ctx, p.b);
+  batten_free(ctx, p.tension);
+  batten_free(ctx, p.scale);
+  batten_free(ctx, p.unit);
+  batten_free(ctx, p.y);
+  batten_free(ctx, before);
   batten_free(ctx, p.residual);
   batten_free(ctx, p.gradient);
-  batten_free(ctx, p.x);
-  batten_free(ctx, p.scale);
   return st;
 }

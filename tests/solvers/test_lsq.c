@@ -110,6 +110,44 @@ static void test_invariance(batten_context *ctx) {
   T_RATIO(difference(N * Q, y, x), 1e-13, "rows reversed");
 }
 
+/* Units so large or small that products of entries leave the range of a double. */
+static void test_extreme_units(batten_context *ctx) {
+  static const int powers[][3] = {{700, 0, 0},    {-700, 0, 0},   {0, 900, 0},     {0, -900, 0},    {900, 900, 0},
+                                  {-900, -900, 0}, {300, 0, 400}, {-300, 0, -400}, {-1030, -900, 0}, {0, 0, 900}};
+  data d = make_data(17), e;
+  double x[N * Q], y[N * Q];
+  for (size_t p = 0; p < sizeof powers / sizeof *powers; p++)
+    for (int method = 0; method < 3; method++) {
+      const int a = powers[p][0], b = powers[p][1], w = powers[p][2];
+      batten_lsq_options o = batten_lsq_options_default();
+      batten_lsq_info info, plain;
+      o.method = methods[method];
+      e = d;
+      o.weights = d.weights;
+      T_OK(batten_lsq_solve(ctx, M, N, Q, d.a, d.b, &o, x, &plain), ctx);
+      for (int i = 0; i < M * N; i++) e.a[i] = ldexp(d.a[i], a);
+      for (int i = 0; i < M * Q; i++) e.b[i] = ldexp(d.b[i], b + i % Q); /* one unit for each right side */
+      for (int i = 0; i < M; i++) e.weights[i] = ldexp(d.weights[i], w);
+      o.weights = e.weights;
+      T_OK(batten_lsq_solve(ctx, M, N, Q, e.a, e.b, &o, y, &info), ctx);
+      for (int i = 0; i < N * Q; i++) y[i] = ldexp(y[i], a - b - i % Q);
+      T_RATIO(difference(N * Q, y, x), a < -1022 ? 1e-11 : 1e-14, "a by 2^%d, b by 2^%d, weights by 2^%d, %s", a, b,
+              w, names[method]);
+      T_RATIO(info.gradient_norm, 1e-13, "its gradient");
+      double ratio = ldexp(info.residual_norm, -b - w / 2) / plain.residual_norm;
+      T_CHECK(ratio > 1 && ratio < 4, "its residual %g is that of the largest right side", info.residual_norm);
+    }
+  for (int i = 0; i < M * Q; i++) e.b[i] = ldexp(d.b[i], 900);
+  for (int i = 0; i < M * N; i++) e.a[i] = ldexp(d.a[i], -900);
+  x[0] = 77;
+  T_STATUS(batten_lsq_solve(ctx, M, N, Q, e.a, e.b, NULL, x, NULL), BATTEN_E_INVALID, ctx, "overflows");
+  T_CHECK(x[0] == 77, "x is untouched");
+  for (int i = 0; i < M * N; i++) e.a[i] = ldexp(d.a[i], 1000);
+  batten_lsq_options o = batten_lsq_options_default();
+  o.weights = e.weights;
+  T_STATUS(batten_lsq_solve(ctx, M, N, Q, e.a, e.b, &o, x, NULL), BATTEN_E_INVALID, ctx, "a: column 0 times");
+}
+
 /* A column nearly dependent: normal equations refuse, QR solves, auto takes QR; fully dependent: all refuse. */
 static void test_rank(batten_context *ctx) {
   data d = make_data(9);
@@ -209,6 +247,7 @@ int main(void) {
   test_by_hand(ctx);
   test_second_routes(ctx);
   test_invariance(ctx);
+  test_extreme_units(ctx);
   test_rank(ctx);
   test_arguments(ctx);
   data d = make_data(13);
