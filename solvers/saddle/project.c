@@ -206,7 +206,7 @@ static void apply_inverse(void *arg, double *x) {
   double largest = 0;
   for (size_t i = 0; i < v->b22.n; i++) largest = fmax(largest, fabs(x[i]));
   if (!(largest > 0 && largest <= DBL_MAX)) return;
-  double unit = ldexp(1, -ilogb(largest));
+  double unit = batten_unit(largest);
   copy_to(v->b22.real, v->b22.n, x, unit, v->rounded);
   batten_rfp_forward(&v->b22, 1, v->rounded, v->b22.n);
   batten_rfp_backward(&v->b22, 1, v->rounded, v->b22.n);

@@ -155,12 +155,21 @@ static batten_status check_options(batten_context *ctx, const batten_saddle_opti
   return BATTEN_OK;
 }
 
+/* A handle takes memory and progress from its own context, so another thread's must not come in with it. */
+static batten_status check_handle(batten_context *ctx, const batten_saddle *s) {
+  if (!ctx) return BATTEN_E_INVALID;
+  if (!s) return batten_fail(ctx, BATTEN_E_INVALID, "s: NULL; make it with batten_saddle_factor()");
+  if (s->ctx != ctx)
+    return batten_fail(ctx, BATTEN_E_INVALID, "s: made with another context; pass the one it was factored with");
+  return BATTEN_OK;
+}
+
 static void scale_p(batten_saddle *s) {
   size_t n = s->matrix.n;
   for (size_t c = 0; c < s->matrix.k; c++) {
     double largest = 0;
     for (size_t i = 0; i < n; i++) largest = fmax(largest, fabs(s->matrix.p[i + c * n]));
-    s->p_scale[c] = largest > 0 ? ldexp(1, -ilogb(largest)) : 1;
+    s->p_scale[c] = largest > 0 ? batten_unit(largest) : 1;
   }
 }
 
@@ -217,7 +226,8 @@ static batten_status apply_factor(batten_saddle *s, double *b) {
   for (size_t i = 0; i < n; i++) b[i] *= s->scale;
   for (size_t c = 0; c < k; c++) b[n + c] *= s->p_scale[c];
   batten_status st = s->a ? batten_saddle_dense_solve(s, 1, b) : batten_saddle_project_solve(s, b);
-  for (size_t c = 0; c < k; c++) b[n + c] *= s->p_scale[c] / s->scale;
+  /* First by the one, then by the other: their quotient may leave the range of a double. */
+  for (size_t c = 0; c < k; c++) b[n + c] = b[n + c] / s->scale * s->p_scale[c];
   return st;
 }
 
@@ -293,8 +303,8 @@ static batten_status refine(batten_saddle *s, const double *f, double f_norm, do
 }
 
 batten_status batten_saddle_solve(batten_context *ctx, batten_saddle *s, const double *f, double *w, double *c) {
-  if (!ctx) return BATTEN_E_INVALID;
-  if (!s) return batten_fail(ctx, BATTEN_E_INVALID, "s: NULL; make it with batten_saddle_factor()");
+  batten_status st = check_handle(ctx, s);
+  if (st < 0) return st;
   size_t n = s->matrix.n, k = s->matrix.k, order = n + k;
   if ((n > 0 && (!f || !w)) || (k > 0 && !c))
     return batten_fail(ctx, BATTEN_E_INVALID, "%s: NULL", n > 0 && !f ? "f" : n > 0 && !w ? "w" : "c");
@@ -302,7 +312,6 @@ batten_status batten_saddle_solve(batten_context *ctx, batten_saddle *s, const d
   if (bad < n) return batten_fail(ctx, BATTEN_E_INVALID, "f[%zu]: %g is not finite", bad, f[bad]);
 
   double start = batten_now(), f_norm = norm_max(n, f);
-  batten_status st = BATTEN_OK;
   double *x = batten_alloc_array(ctx, order, 3 * sizeof *x);
   if (!x) return BATTEN_E_NOMEM;
   double *r = x + order, *best = r + order;
@@ -353,8 +362,8 @@ static batten_status dense_diagonal(const batten_saddle *s, size_t count, const 
 
 batten_status batten_saddle_inverse_diagonal(batten_context *ctx, batten_saddle *s, size_t count, const size_t *index,
                                              double *diagonal) {
-  if (!ctx) return BATTEN_E_INVALID;
-  if (!s) return batten_fail(ctx, BATTEN_E_INVALID, "s: NULL; make it with batten_saddle_factor()");
+  batten_status st = check_handle(ctx, s);
+  if (st < 0) return st;
   if (count > 0 && (!index || !diagonal))
     return batten_fail(ctx, BATTEN_E_INVALID, "%s: NULL", index ? "diagonal" : "index");
   size_t n = s->matrix.n;
@@ -364,7 +373,7 @@ batten_status batten_saddle_inverse_diagonal(batten_context *ctx, batten_saddle 
 
   double *result = batten_alloc_array(ctx, count, sizeof *result);
   if (!result) return BATTEN_E_NOMEM;
-  batten_status st = s->factored ? BATTEN_OK : factor_from(s, s->info.method);
+  st = s->factored ? BATTEN_OK : factor_from(s, s->info.method);
   for (size_t first = 0; first < count && st == BATTEN_OK; first += RIGHT_SIDES) {
     size_t these = count - first < RIGHT_SIDES ? count - first : RIGHT_SIDES;
     st = batten_progress(ctx, "leave-one-out", (double)first / (double)count);

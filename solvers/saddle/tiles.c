@@ -145,7 +145,7 @@ batten_status batten_saddle_probe_scale(batten_saddle *s) {
       for (size_t i = 0; i < rows; i++) largest = fmax(largest, fabs(column[i]));
     }
   batten_free(s->ctx, column);
-  s->scale = largest > 0 && largest <= DBL_MAX ? ldexp(1, -ilogb(largest)) : 1;
+  s->scale = largest > 0 && largest <= DBL_MAX ? batten_unit(largest) : 1;
   return BATTEN_OK;
 }
 

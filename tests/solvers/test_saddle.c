@@ -158,19 +158,43 @@ static void test_invariance(batten_context *ctx) {
   for (size_t i = 0; i < s.n; i++) back[i] = other[s.n - 1 - i];
   T_RATIO(difference(s.n, w, back), 1e-11, "reversed order");
   scene_free(&t);
-  t = scene_new(SCENE_RANDOM, KERNEL_R, 150, 4, 21);
-  t.factor = 0x1p40;
-  for (size_t i = 0; i < 4 * t.n; i++) t.p[i] *= 0x1p-30;
-  for (int q = 0; q < METHODS; q++) {
-    solve_scene(ctx, &s, methods[q], w, c, NULL);
-    solve_scene(ctx, &t, methods[q], other, other_c, NULL);
-    for (size_t i = 0; i < s.n; i++) other[i] *= 0x1p40;
-    for (size_t i = 0; i < 4; i++) other_c[i] *= 0x1p-30;
-    T_CHECK(!memcmp(w, other, s.n * sizeof *w) && !memcmp(c, other_c, sizeof c),
-            "K scaled by 2^40 and P by 2^-30: same bits by %s", batten_saddle_method_name(methods[q]));
+  static const int units[][2] = {{40, -30}, {-500, -500}, {500, 450}};
+  for (size_t u = 0; u < sizeof units / sizeof *units; u++) {
+    t = scene_new(SCENE_RANDOM, KERNEL_R, 150, 4, 21);
+    t.factor = ldexp(1, units[u][0]);
+    for (size_t i = 0; i < 4 * t.n; i++) t.p[i] = ldexp(t.p[i], units[u][1]);
+    for (int q = 0; q < METHODS; q++) {
+      solve_scene(ctx, &s, methods[q], w, c, NULL);
+      solve_scene(ctx, &t, methods[q], other, other_c, NULL);
+      for (size_t i = 0; i < s.n; i++) other[i] = ldexp(other[i], units[u][0]);
+      for (size_t i = 0; i < 4; i++) other_c[i] = ldexp(other_c[i], units[u][1]);
+      T_CHECK(!memcmp(w, other, s.n * sizeof *w) && !memcmp(c, other_c, sizeof c),
+              "K scaled by 2^%d and P by 2^%d: same bits by %s", units[u][0], units[u][1],
+              batten_saddle_method_name(methods[q]));
+    }
+    scene_free(&t);
   }
-  scene_free(&t);
   scene_free(&s);
+}
+
+/* Entries of K, of P or of f that are subnormal numbers, and scales whose quotient is no double: few digits, but no
+ * infinities. */
+static void test_extreme_units(batten_context *ctx) {
+  static const int powers[][3] = {{-1040, 0, -300}, {0, -1040, -600}, {0, 0, -1030}, {550, -500, 0}};
+  static double w[100];
+  double c[4];
+  for (size_t u = 0; u < sizeof powers / sizeof *powers; u++)
+    for (int q = 0; q < METHODS; q++) {
+      scene s = scene_new(SCENE_RANDOM, KERNEL_R, 100, 4, 23);
+      s.factor = ldexp(1, powers[u][0]);
+      for (size_t i = 0; i < 4 * s.n; i++) s.p[i] = ldexp(s.p[i], powers[u][1]);
+      for (size_t i = 0; i < s.n; i++) s.f[i] = ldexp(s.f[i], powers[u][2]);
+      batten_status st = solve_scene(ctx, &s, methods[q], w, c, NULL);
+      double miss = scene_check(&s, w, c).residual;
+      T_CHECK(st >= 0 && miss < (powers[u][2] < -1022 ? 1e-9 : 1e-13), "K by 2^%d, P by 2^%d, f by 2^%d, %s: %.2g",
+              powers[u][0], powers[u][1], powers[u][2], batten_saddle_method_name(methods[q]), miss);
+      scene_free(&s);
+    }
 }
 
 /* The threads of the context change no bit (those of BLAS may). */
@@ -292,6 +316,7 @@ int main(void) {
   test_second_routes(ctx);
   test_reproduction(ctx);
   test_invariance(ctx);
+  test_extreme_units(ctx);
   test_threads();
   test_inverse_diagonal(ctx);
   test_leave_one_out(ctx);

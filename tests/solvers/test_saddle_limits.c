@@ -74,6 +74,11 @@ static void test_arguments(batten_context *ctx) {
   T_OK(batten_saddle_factor(ctx, &good, NULL, &h), ctx);
   T_CHECK(batten_saddle_solve(NULL, h, s.f, w, c) == BATTEN_E_INVALID, "no context");
   T_STATUS(batten_saddle_solve(ctx, NULL, s.f, w, c), BATTEN_E_INVALID, ctx, "s: NULL");
+  batten_context *other = t_context(NULL, NULL, 1);
+  T_STATUS(batten_saddle_solve(other, h, s.f, w, c), BATTEN_E_INVALID, other, "s: made with another context");
+  T_STATUS(batten_saddle_inverse_diagonal(other, h, 1, (size_t[]){0}, w), BATTEN_E_INVALID, other,
+           "s: made with another context");
+  batten_context_free(other);
   T_STATUS(batten_saddle_solve(ctx, h, NULL, w, c), BATTEN_E_INVALID, ctx, "f: NULL");
   T_STATUS(batten_saddle_solve(ctx, h, s.f, NULL, c), BATTEN_E_INVALID, ctx, "w: NULL");
   T_STATUS(batten_saddle_solve(ctx, h, s.f, w, NULL), BATTEN_E_INVALID, ctx, "c: NULL");
@@ -216,6 +221,28 @@ static void test_stall(void) {
     batten_saddle_free(h);
     T_CHECK(batten_bytes_in_use(ctx) == 0, "all memory is given back");
     batten_context_free(ctx);
+    scene_free(&s);
+  }
+}
+
+/* The same with a matrix that has become indefinite: from a stall of either factor down to LDL' within one solve. */
+static void test_stall_to_ldl(batten_context *ctx) {
+  double w[300], c[4];
+  for (int method = BATTEN_SADDLE_CHOLESKY; method <= BATTEN_SADDLE_CHOLESKY_MIXED; method++) {
+    scene s = scene_new(SCENE_RANDOM, KERNEL_R, 300, 4, 17);
+    batten_saddle_matrix m = scene_matrix(&s);
+    batten_saddle_options o = batten_saddle_options_default();
+    batten_saddle *h = NULL;
+    o.method = (batten_saddle_method)method;
+    T_OK(batten_saddle_factor(ctx, &m, &o, &h), ctx);
+    s.factor = -1;
+    T_OK(batten_saddle_solve(ctx, h, s.f, w, c), ctx);
+    batten_saddle_info info = batten_saddle_get_info(h);
+    T_CHECK(info.method == BATTEN_SADDLE_LDL && info.fallbacks == (unsigned)method,
+            "from %s a stall leads to %s after %u fall-backs", batten_saddle_method_name(o.method),
+            batten_saddle_method_name(info.method), info.fallbacks);
+    T_RATIO(scene_check(&s, w, c).residual, 1.5e-13, "residual after it");
+    batten_saddle_free(h);
     scene_free(&s);
   }
 }
@@ -375,6 +402,7 @@ int main(void) {
   test_singular(ctx);
   test_fallback(ctx);
   test_stall();
+  test_stall_to_ldl(ctx);
   test_memory();
   test_accepted();
   scene s = scene_new(SCENE_RANDOM, KERNEL_R, 40, 4, 15);
