@@ -40,7 +40,7 @@ void batten_context_free(batten_context *ctx) {
   if (ctx) ctx->options.release(ctx->options.memory_user, ctx);
 }
 
-const char *batten_error(const batten_context *ctx) { return ctx->error; }
+const char *batten_error(const batten_context *ctx) { return ctx ? ctx->error : ""; }
 
 unsigned batten_threads(const batten_context *ctx) { return ctx->options.threads; }
 

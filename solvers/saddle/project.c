@@ -245,34 +245,33 @@ size_t batten_saddle_project_bytes(batten_la_real real, size_t n, size_t k) {
   if (!batten_rfp_count(rest, &packed) || !batten_mul(packed, (size_t)real, &packed) ||
       !batten_mul3(n, k, sizeof(double), &head))
     return SIZE_MAX;
-  size_t walk = head + batten_saddle_walk_bytes(n); /* X and the tiles */
-  size_t product = 2 * head + 2 * k * k * sizeof(double) + batten_saddle_product_bytes(n, k);
+  /* X, Z and the product that makes X: more than X and the tiles of the assembly. */
+  size_t scratch = 2 * head + 2 * k * k * sizeof(double) + batten_saddle_product_bytes(n, k);
   size_t norms = rest * (2 * sizeof(double) + sizeof(batten_la_int) + (size_t)real);
-  size_t scratch = walk, solve = batten_saddle_solve_bytes(n, k);
+  size_t solve = batten_saddle_solve_bytes(n, k);
   if (norms > scratch) scratch = norms;
   if (solve > scratch) scratch = solve;
-  if (!batten_add(packed, head, &bytes) || !batten_add(bytes, scratch, &bytes)) return SIZE_MAX;
-  return k > 0 && product > bytes ? product : bytes; /* the product comes before the factor is there */
+  return batten_add(packed, head, &bytes) && batten_add(bytes, scratch, &bytes) ? bytes : SIZE_MAX;
 }
 
 batten_status batten_saddle_project_factor(batten_saddle *s, batten_la_real real) {
   size_t n = s->matrix.n, k = s->matrix.k, count = 0, failed;
   double start = batten_now();
   batten_status st = BATTEN_E_NOMEM;
-  double *sums = NULL, *x = batten_alloc_array(s->ctx, n * k, sizeof *x);
-  if (!x) goto done;
+  double *sums = NULL, *x = NULL;
   batten_rfp_count(n - k, &count);
   s->real = real;
+  s->rfp = batten_alloc_array(s->ctx, count, (size_t)real); /* the large one first: the work is lost without it */
+  if (!s->rfp) goto done;
+  s->head = batten_alloc_array(s->ctx, n * k, sizeof *s->head);
+  if (!s->head) goto done;
+  x = batten_alloc_array(s->ctx, n * k, sizeof *x);
+  if (!x) goto done;
   st = k > 0 ? projection(s, x) : BATTEN_OK;
   if (st < 0) goto done;
   double projected = batten_now();
   s->info.time_project_s = projected - start;
 
-  st = BATTEN_E_NOMEM;
-  s->head = batten_alloc_array(s->ctx, n * k, sizeof *s->head);
-  if (!s->head) goto done;
-  s->rfp = batten_alloc_array(s->ctx, count, (size_t)real);
-  if (!s->rfp) goto done;
   st = assemble(s, x);
   if (st < 0) goto done;
   batten_free(s->ctx, x);

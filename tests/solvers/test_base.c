@@ -1,4 +1,9 @@
 /* Context, memory, status, parallel loop. */
+#include <float.h>
+#include <pthread.h>
+#include <signal.h>
+#include <time.h>
+
 #include "base/checked.h"
 #include "tap.h"
 
@@ -19,6 +24,7 @@ static void test_options(void) {
   o.allocate = t_allocate;
   T_CHECK(batten_context_new(&o, &ctx) == BATTEN_E_INVALID && !ctx, "half a pair of memory hooks is refused");
   T_CHECK(batten_context_new(NULL, NULL) == BATTEN_E_INVALID, "no result pointer is refused");
+  T_CHECK(!strcmp(batten_error(NULL), ""), "no context has no error text");
 }
 
 static void test_memory(void) {
@@ -30,7 +36,8 @@ static void test_memory(void) {
   a = batten_realloc_array(ctx, a, 1000, sizeof *a);
   T_CHECK(a && a[9] == 9 && batten_bytes_in_use(ctx) == 8000, "grown, content kept");
   T_CHECK(batten_bytes_peak(ctx) == 8080, "peak counts both blocks");
-  T_CHECK(!batten_alloc_array(ctx, SIZE_MAX / 4, 8) && strstr(batten_error(ctx), "out of memory"), "product overflow");
+  T_CHECK(!batten_alloc_array(ctx, SIZE_MAX / 4, 8) && strstr(batten_error(ctx), "out of memory"),
+          "product overflow");
   T_CHECK(!batten_alloc(ctx, SIZE_MAX - 4), "sum overflow");
   memory.fail_at = memory.calls + 1;
   T_CHECK(!batten_realloc_array(ctx, a, 2000, sizeof *a) && a[9] == 9, "failed growth leaves the block");
@@ -53,6 +60,9 @@ static void test_memory(void) {
 
 static void test_checked(void) {
   size_t out;
+  T_CHECK(batten_unit(1) == 1 && batten_unit(0.75) == 2 && batten_unit(DBL_MAX) * DBL_MAX < 2 &&
+              batten_unit(DBL_MAX) * DBL_MAX >= 1 && batten_unit(0x1p-1074) == 0x1p1022,
+          "units, also of the largest and the smallest number");
   T_CHECK(batten_mul(3, 5, &out) && out == 15, "product");
   T_CHECK(!batten_mul(SIZE_MAX / 2, 3, &out) && out == SIZE_MAX, "product saturates");
   T_CHECK(!batten_mul3(SIZE_MAX / 2, 3, 1, &out) && out == SIZE_MAX, "triple product saturates");
@@ -98,6 +108,37 @@ static void test_parallel(void) {
   T_CHECK(calls == 1 && !memcmp(one, v, sizeof v), "same bits on the host's executor");
 }
 
+/* The host's signal handlers must not find themselves on a thread that the host knows nothing of. */
+typedef struct signals {
+  pthread_t caller;
+  int open[64]; /* per task: signals that a batten thread would take */
+} signals;
+
+static void look_at_signals(void *arg, size_t i) {
+  signals *s = arg;
+  sigset_t mask;
+  struct timespec wait = {.tv_nsec = 200000}; /* so that every thread gets a task */
+  nanosleep(&wait, NULL);
+  pthread_sigmask(SIG_BLOCK, NULL, &mask);
+  if (pthread_equal(pthread_self(), s->caller)) return;
+  s->open[i] = !sigismember(&mask, SIGALRM) || !sigismember(&mask, SIGTERM) || sigismember(&mask, SIGSEGV) ? 1 : -1;
+}
+
+static void test_signals(void) {
+  signals s = {.caller = pthread_self()};
+  batten_context *ctx = t_context(NULL, NULL, 4);
+  sigset_t before, after;
+  pthread_sigmask(SIG_BLOCK, NULL, &before);
+  batten_parallel(ctx, 64, look_at_signals, &s);
+  pthread_sigmask(SIG_BLOCK, NULL, &after);
+  int open = 0, closed = 0;
+  for (int i = 0; i < 64; i++) open += s.open[i] > 0, closed += s.open[i] < 0;
+  T_CHECK(open == 0 && closed > 0, "%d tasks on own threads, %d of them take the host's signals", closed + open,
+          open);
+  T_CHECK(!sigismember(&before, SIGALRM) && !sigismember(&after, SIGALRM), "the caller goes on taking them");
+  batten_context_free(ctx);
+}
+
 static void test_progress(void) {
   t_progress progress = {.cancel_at = 2};
   batten_context *ctx = t_context(NULL, &progress, 1);
@@ -114,6 +155,7 @@ int main(void) {
   test_memory();
   test_checked();
   test_parallel();
+  test_signals();
   test_progress();
   double a = batten_now();
   T_CHECK(batten_now() >= a, "clock does not run backwards");

@@ -236,12 +236,12 @@ static void test_stall_to_ldl(batten_context *ctx) {
     o.method = (batten_saddle_method)method;
     T_OK(batten_saddle_factor(ctx, &m, &o, &h), ctx);
     s.factor = -1;
-    T_OK(batten_saddle_solve(ctx, h, s.f, w, c), ctx);
+    batten_status st = batten_saddle_solve(ctx, h, s.f, w, c);
     batten_saddle_info info = batten_saddle_get_info(h);
-    T_CHECK(info.method == BATTEN_SADDLE_LDL && info.fallbacks == (unsigned)method,
+    T_CHECK(st >= 0 && info.method == BATTEN_SADDLE_LDL && info.fallbacks == (unsigned)method,
             "from %s a stall leads to %s after %u fall-backs", batten_saddle_method_name(o.method),
             batten_saddle_method_name(info.method), info.fallbacks);
-    T_RATIO(scene_check(&s, w, c).residual, 1.5e-13, "residual after it");
+    T_RATIO(scene_check(&s, w, c).scaled, 30, "residual after it over rounding");
     batten_saddle_free(h);
     scene_free(&s);
   }

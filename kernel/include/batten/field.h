@@ -14,7 +14,8 @@ typedef struct batten_field {
   unsigned order;     /* highest derivative that evaluate supplies: 0, 1 or 2 */
   /* points [count][n]; values [count], gradients [count][n], hessians [count][n][n], each NULL when not
    * wanted, gradients and hessians always NULL above `order`. Outputs do not overlap the input. A
-   * negative status is handed on to the caller. Called on the calling thread. */
+   * negative status is handed on to the caller, the outputs then being partly written: a batch may be large, and a
+   * copy to keep them would cost as much memory again. Called on the calling thread. */
   batten_status (*evaluate)(const void *user, batten_context *ctx, size_t count, const double *points,
                             double *values, double *gradients, double *hessians);
   const void *user;

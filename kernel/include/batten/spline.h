@@ -95,7 +95,8 @@ BATTEN_API batten_status batten_spline_create(batten_context *ctx, const batten_
 /* points [count][n]; values [count], gradients [count][n], hessians [count][n][n]; each may be NULL.
  * Threaded and vectorised; the same bits for any thread count, any batch and any instruction set. Derivatives that do
  * not exist at a centre (r^1: gradient; r^3 with gradient data: Hessian) are evaluated as if its term were 0. Points
- * that are not finite give NaN. Progress (phase "evaluate") only in batches that take long. */
+ * that are not finite give NaN. Progress (phase "evaluate") only in batches that take long; cancelled, the outputs are
+ * partly written. Fails: INVALID (outputs untouched), CANCELLED. */
 BATTEN_API batten_status batten_spline_evaluate(batten_context *ctx, const batten_spline *s, size_t count,
                                                 const double *points, double *values, double *gradients,
                                                 double *hessians);

@@ -33,8 +33,9 @@ extern "C" {
 #define BATTEN_VERSION_PATCH 0
 
 /* The one list of status codes: X(name, value, text).
- * 0 done; negative: could not, and no output argument was touched; positive: done,
- * outputs are valid, but look at the result struct and at batten_error(). */
+ * 0 done; negative: could not, and no output argument was touched (but the arrays of a
+ * batch of field values: see <batten/field.h>); positive: done, outputs are valid, but
+ * look at the result struct and at batten_error(). */
 #define BATTEN_STATUS_LIST(X)                                                            \
   X(BATTEN_OK, 0, "done")                                                                \
   X(BATTEN_W_ACCURACY, 1, "done, but a residual misses its tolerance")                   \
@@ -76,9 +77,10 @@ typedef struct batten_context_options {
   void *memory_user;
   size_t memory_limit; /* bytes that the context may hold at a time, 0 = no limit. Default 0. */
 
-  unsigned threads; /* threads of batten's own loops, >= 1. Default 1. Results do not depend on it. */
+  unsigned threads; /* threads of batten's own loops, 1 .. 4096, of which no loop uses more than 64. Default 1. Results
+                       do not depend on it. */
 
-  /* Host executor for batten's own loops; NULL = own threads. Must call task(arg, i) once for
+  /* Host executor for batten's own loops, in place of `threads`; NULL = own threads. Must call task(arg, i) once for
    * each i < tasks, in any order, on any threads, and return when all have returned. */
   void (*parallel_for)(void *parallel_user, size_t tasks, void (*task)(void *arg, size_t index), void *arg);
   void *parallel_user;
@@ -98,7 +100,7 @@ BATTEN_API batten_status batten_context_new(const batten_context_options *opt, b
 BATTEN_API void batten_context_free(batten_context *ctx);
 
 /* Text of the last negative or positive status on this context: names argument, index, value and
- * remedy. "" when there was none. Valid until the next call on the context. */
+ * remedy. "" when there was none, or ctx is NULL. Valid until the next call on the context. */
 BATTEN_API const char *batten_error(const batten_context *ctx);
 
 /* Bytes held now, and the most held at a time since the last reset. */

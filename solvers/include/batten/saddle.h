@@ -26,7 +26,8 @@ typedef enum batten_saddle_method {
 BATTEN_API const char *batten_saddle_method_name(batten_saddle_method method);
 
 /* The matrix. fill writes K[row0 + i][col0 + j] to tile[i + j * ld], i < rows, j < cols (column-major).
- * It is called from several threads at a time when the context has more than one: it must only read.
+ * It is called from several threads at a time when the context has more than one, or a host's executor: it must only
+ * read.
  * K must be symmetric to the bit: entry (i, j) equals entry (j, i). */
 typedef struct batten_saddle_matrix {
   size_t n;        /* N >= 0 */
@@ -69,12 +70,15 @@ BATTEN_API size_t batten_saddle_bytes(batten_saddle_method method, size_t n, siz
 BATTEN_API batten_status batten_saddle_factor(batten_context *ctx, const batten_saddle_matrix *matrix,
                                               const batten_saddle_options *opt, batten_saddle **out);
 
-/* w [N], c [k] from f [N] (finite); w may not overlap f. Positive status: BATTEN_W_ACCURACY. */
+/* w [N], c [k] from f [N] (finite); w may be f. ctx is the one that s was factored with: a handle serves one thread at a
+ * time, since a solve may fall back to another factor. Positive status: BATTEN_W_ACCURACY. Fails as factor does; the
+ * handle stays usable. Each refinement step costs N^2/2 entries of K anew. */
 BATTEN_API batten_status batten_saddle_solve(batten_context *ctx, batten_saddle *s, const double *f, double *w,
                                              double *c);
 
 /* diagonal[q] = (inverse of the whole matrix)[index[q]][index[q]], q < count: leave-one-out errors are
- * w_i / diagonal_i (Rippa 1999). Cost: N^2 flops each. Float precision when the factor is mixed. */
+ * w_i / diagonal_i (Rippa 1999). Cost: N^2 flops each, and 64 N numbers beyond what batten_saddle_bytes() says. Float
+ * precision when the factor is mixed. Fails: INVALID, NOMEM, CANCELLED. */
 BATTEN_API batten_status batten_saddle_inverse_diagonal(batten_context *ctx, batten_saddle *s, size_t count,
                                                         const size_t *index, double *diagonal);
 
