@@ -59,7 +59,6 @@ const char *cli_nearest(const char *text, const char *const *words, size_t count
 void cli_error(const char *format, ...) BATTEN_PRINTF(1, 2);
 int cli_usage(const char *command, const char *format, ...) BATTEN_PRINTF(2, 3);
 
-
 struct cli_outputs;
 
 /* ---- progress.c: context, progress bar, Ctrl-C ---- */
@@ -94,8 +93,8 @@ typedef enum cli_output_kind {
 typedef struct cli_output {
   cli_output_kind kind;
   const char *path; /* as given */
-  char *target;     /* where links lead */
-  char *staged;     /* what is written until all are whole */
+  char *target;     /* where links lead; "-" = standard output */
+  char *staged;     /* what is written until all are whole; NULL = target is written straight */
 } cli_output;
 
 typedef struct cli_outputs {
@@ -107,6 +106,8 @@ bool cli_outputs_add(cli_outputs *o, cli_output_kind kind, const char *path);
 /* Before the work begins: extensions, directories, permissions, the same name twice, the input's own name.
  * False after a line on stderr; *usage is set when it is the caller's mistake of usage. */
 bool cli_outputs_check(cli_outputs *o, const char *input, bool *usage);
+/* A report goes to standard output ("-"): nothing else may. */
+bool cli_outputs_to_stdout(const cli_outputs *o);
 /* dimension 2 or 3: formats that fit. */
 bool cli_outputs_check_dimension(const cli_outputs *o, unsigned dimension);
 /* Moves all into place; false after a line on stderr, with nothing new left. */

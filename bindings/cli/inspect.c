@@ -10,7 +10,8 @@
 enum { OPT_REPORT = CHAR_MAX + 1, OPT_THREADS };
 
 static const cli_option table[] = {
-    {"report", OPT_REPORT, "FILE", "figures as a flat JSON object (keys: docs/report.md)"},
+    {"report", OPT_REPORT, "FILE",
+     "figures as a flat JSON object (keys: docs/report.md); - prints them in\nplace of the summary"},
     {"threads", OPT_THREADS, "N", "threads; default all cores"},
     {"quiet", 'q', NULL, "no summary"},
     {"help", 'h', NULL, "this text"},
@@ -188,7 +189,7 @@ static int work(request *q) {
   cli_report_open(&report);
   batten_file_kind kind = BATTEN_FILE_UNKNOWN;
   batten_status st = batten_file_identify(run.ctx, q->input, &kind);
-  bool print = !q->quiet;
+  bool print = !q->quiet && !cli_outputs_to_stdout(&q->outputs);
   if (st >= 0) {
     cli_report_text(&report, "command", "inspect");
     cli_report_common(&report, &run, st);

@@ -56,12 +56,24 @@ bool cli_outputs_add(cli_outputs *o, cli_output_kind kind, const char *path) {
   return true;
 }
 
+static bool is_stdout(const cli_output *f) {
+  return f->kind == CLI_OUTPUT_REPORT && (strcmp(f->path, "-") == 0 || strcmp(f->path, "/dev/stdout") == 0);
+}
+
+bool cli_outputs_to_stdout(const cli_outputs *o) {
+  for (size_t i = 0; i < o->count; i++)
+    if (is_stdout(&o->items[i])) return true;
+  return false;
+}
+
 /* Where the file will be, with links followed, and the name beside it under which it grows: the extension stays,
  * since it tells the format. What is no regular file (a pipe, a device) is written straight. */
 static bool stage(cli_output *f, size_t index) {
   struct stat info;
+  if (is_stdout(f)) return (f->target = copy_text("-", 1)) != NULL;
   bool exists = stat(f->path, &info) == 0;
-  f->target = exists ? realpath(f->path, NULL) : copy_text(f->path, strlen(f->path));
+  /* A pipe under /dev/fd has no real path. */
+  f->target = exists && S_ISREG(info.st_mode) ? realpath(f->path, NULL) : copy_text(f->path, strlen(f->path));
   if (!f->target) {
     cli_error("%s: cannot be resolved: %s", f->path, strerror(errno));
     return false;

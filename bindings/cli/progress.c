@@ -90,6 +90,7 @@ static void explain(const cli_run *run, batten_status status, char *text, size_t
       {"opt.spline.smoothing", "--smoothing"}, {"memory_limit", "--memory"},
       {"opt.orientation", "--orientation"},    {"opt.cell", "--cell"},
       {"opt.width, opt.height", "--size"},     {"opt.carrier", "--carrier"},
+      {", or opt.improve larger than 0", ""},
   };
   const char *own = batten_error(run->ctx);
   bool points = strncmp(own, "points", 6) == 0 || strncmp(own, "matrix", 6) == 0 || strncmp(own, "seeds", 5) == 0;

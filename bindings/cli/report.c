@@ -75,9 +75,10 @@ bool cli_report_write(const cli_report *r, const char *path, const char *shown) 
     cli_error("%s: out of memory", shown);
     return false;
   }
-  FILE *f = fopen(path, "w");
+  bool to_stdout = strcmp(path, "-") == 0;
+  FILE *f = to_stdout ? stdout : fopen(path, "w");
   bool ok = f && fputs(text, f) >= 0 && fputc('\n', f) != EOF;
-  if (f) ok = fclose(f) == 0 && ok;
+  if (f) ok = (to_stdout ? fflush(f) : fclose(f)) == 0 && ok;
   if (!ok) cli_error("%s: cannot be written: %s", shown, strerror(errno));
   free(text);
   return ok;

@@ -45,7 +45,8 @@ static const cli_option table[] = {
      "surface, by extension: .ply .obj .stl .off .vtp .vtu; outline of plane points:\n"
      ".svg .csv .xyz .txt .vtp .obj; may be given more than once"},
     {"picture", OPT_PICTURE, "FILE", "shaded view .png, of plane points .png or .svg"},
-    {"report", OPT_REPORT, "FILE", "figures as a flat JSON object (keys: docs/report.md)"},
+    {"report", OPT_REPORT, "FILE",
+     "figures as a flat JSON object (keys: docs/report.md); - prints them in\nplace of the summary"},
     {"save", OPT_SAVE, "FILE", "the solid itself, as JSON that batten reads back to the same bits"},
     {"carrier", OPT_CARRIER, "WHAT",
      "auto, ball, ellipsoid (fitted to the points), none, or a carrier FILE.json;\n"
@@ -59,7 +60,8 @@ static const cli_option table[] = {
     {"orient-data", OPT_ORIENT_DATA, "WHAT", "orientation enters as auto, gradients or pairs; default auto"},
     {"orient-method", OPT_ORIENT_METHOD, "HOW", "estimated by auto, energy or planes; default auto"},
     {"method", OPT_METHOD, "NAME", "linear solver: auto, cholesky, mixed, ldl or qr; default auto"},
-    {"cell", OPT_CELL, "LENGTH", "edge length of the mesh; default from the points' spacing"},
+    {"cell", OPT_CELL, "LENGTH",
+     "edge length of the mesh; default from the points' spacing, but at most\n1/120 of the diagonal of their box"},
     {"box", OPT_BOX, "X0,Y0[,Z0],X1,...", "cut the surface at this box; default: the points' box grown by 25 %"},
     {"memory", OPT_MEMORY, "SIZE", "use at most so much, for instance 2G; default no limit"},
     {"loo", OPT_LOO, "N", "leave-one-out errors of N points, all or none; default 256"},
@@ -335,18 +337,22 @@ static batten_status fit(solid_work *w) {
   return st;
 }
 
+/* Finer than the library does where points are few: the surface between them is smooth and shall look so. */
+static double default_cell(const solid_work *w) {
+  double lower[3] = {0}, upper[3] = {0};
+  batten_solid_box(w->solid, lower, upper);
+  double diagonal = hypot(hypot(upper[0] - lower[0], upper[1] - lower[1]), upper[2] - lower[2]);
+  if (w->cloud.n == 2) return fmax(w->info.spacing / 10, 2e-4 * diagonal); /* lines are cheap */
+  return fmin(fmax(0.7 * w->info.spacing, diagonal / 200), diagonal / 120);
+}
+
 static batten_status make_surface(solid_work *w) {
   double start = batten_now();
   batten_context *ctx = w->run.ctx;
   batten_field field = batten_solid_field(w->solid);
   size_t count;
   const double *seeds = batten_solid_points(w->solid, &count);
-  /* Lines are cheap: ten to the spacing of the points draw as curves, as far as the box does not take too many. */
-  if (w->cloud.n == 2 && w->request->surface.cell == 0) {
-    double lower[2], upper[2];
-    batten_solid_box(w->solid, lower, upper);
-    w->request->surface.cell = fmax(w->info.spacing / 10, 2e-4 * hypot(upper[0] - lower[0], upper[1] - lower[1]));
-  }
+  if (w->request->surface.cell == 0) w->request->surface.cell = default_cell(w);
   batten_status st =
       w->cloud.n == 2
           ? batten_trace_outline(ctx, &field, count, seeds, &w->request->surface, &w->outline, &w->surface)
@@ -433,7 +439,7 @@ static int work(solid_request *q) {
   if (st >= 0) st = fit(&w);
   if (st >= 0) st = make_surface(&w);
   status = st < 0 ? cli_run_failed(&w.run, st) : write_outputs(&w);
-  if (status == CLI_DONE && !q->quiet) solid_summary(&w);
+  if (status == CLI_DONE && !q->quiet && !cli_outputs_to_stdout(&q->outputs)) solid_summary(&w);
 done:
   work_free(&w);
   return status;

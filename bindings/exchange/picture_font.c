@@ -110,6 +110,9 @@ static const char *const glyphs[GLYPH_LAST - GLYPH_FIRST + 1] = {
 /* Letters narrower than the grid is wide, and the gap between them, in units of 1/8 of the capitals' height. */
 static const double unit_width = 0.8, gap = 2.0, blank = 3.0;
 
+/* Other characters become one '?' each: the bytes of UTF-8 after their first are passed over. */
+static bool continues(char c) { return ((unsigned char)c & 0xc0) == 0x80; }
+
 static const char *glyph_of(char c) {
   unsigned char u = (unsigned char)c;
   return glyphs[(u < GLYPH_FIRST || u > GLYPH_LAST ? '?' : u) - GLYPH_FIRST];
@@ -124,7 +127,8 @@ static double glyph_width(const char *glyph) {
 
 double picture_text_width(double height, const char *text) {
   double width = 0;
-  for (const char *p = text; *p; p++) width += *p == ' ' ? blank : glyph_width(glyph_of(*p)) + gap;
+  for (const char *p = text; *p; p++)
+    width += *p == ' ' ? blank : continues(*p) ? 0 : glyph_width(glyph_of(*p)) + gap;
   return (*text ? width - gap : 0) * height / 8;
 }
 
@@ -182,6 +186,7 @@ void picture_mask_text(picture_image *image, double x, double y, double height, 
       p.x += blank * p.scale;
       continue;
     }
+    if (continues(*c)) continue;
     const char *glyph = glyph_of(*c);
     for (const char *s = glyph; *s;) {
       size_t length = strcspn(s, " ");

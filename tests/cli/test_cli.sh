@@ -181,6 +181,27 @@ check "inspect knows a solid" grep -q '^kernel .*r^1' out
 run 0 "" inspect s.csv
 check "inspect knows points" grep -q '^points .*600, in space' out
 
+# A report on standard output is alone there: through a pipe, into a file, behind what is there already.
+"$batten" solid s.csv --report - 2>err | python3 -c 'import json, sys; sys.exit(json.load(sys.stdin)["points_used"] != 600)'
+ok $? "--report - is JSON and nothing else"
+"$batten" inspect s.ply --report /dev/stdout 2>err | python3 -c 'import json, sys; sys.exit(json.load(sys.stdin)["kind"] != "mesh")'
+ok $? "so is --report /dev/stdout, when it is a pipe: $(cat err)"
+{ echo before; "$batten" inspect s.ply --report /dev/stdout; } >both 2>err
+check "and when it is a file, what stood there is kept" test "$(head -n 2 both | tr '\n' ' ')" = 'before { '
+check "no file '-' is made" test ! -e -
+"$batten" inspect s.ply -q --report /dev/fd/5 5>&1 >out 2>err | grep -q '"kind": "mesh"'
+ok $? "a report goes into a pipe under /dev/fd: $(cat err)"
+run 1 "/dev/full: cannot be written" inspect s.ply --report /dev/full
+"$batten" inspect s.ply --report - >/dev/full 2>err
+[ $? -eq 1 ] && grep -q '^batten: -: cannot be written: No space left' err
+ok $? "a full standard output is told: $(cat err)"
+
+# Few points make a mesh that looks smooth: edges of at most 1/120 of the diagonal of the points' box.
+head -n 600 s.csv | awk 'NR % 6 == 1' >few.csv
+run 0 "" solid few.csv --report few.json --quiet
+holds few.json cell 'x > 0 && x <= 1.001 * 4 * sqrt(3) / 120'
+holds few.json volume 'x > 33.5103 * 0.998 && x < 33.5103 * 1.002'
+
 # The same from gzip, with other threads: the same figures, the same mesh.
 gzip -k s.csv
 run 0 "" solid s.csv.gz -o t.ply --report t.json --quiet --threads 1

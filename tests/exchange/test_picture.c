@@ -100,6 +100,8 @@ static void test_mask(batten_context *ctx) {
   T_RATIO(fabs(picture_text_width(8, "II") - 2 * picture_text_width(8, "I") - 2), 1e-12,
           "letters stand 2 units apart");
   T_CHECK(picture_text_width(8, "\xc3") == picture_text_width(8, "?"), "what has no letter is a question mark");
+  T_CHECK(picture_text_width(8, "5 \xc2\xb5m \xe2\x82\xac") == picture_text_width(8, "5 ?m ?"),
+          "and a character of several bytes is one");
   picture_image_free(ctx, &im);
 }
 
