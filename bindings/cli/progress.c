@@ -45,13 +45,20 @@ void cli_run_clear(cli_run *run) {
   run->line = false;
 }
 
+/* 0 when unknown. A request beyond it is refused with its size, before the system grants it and ends the program when
+ * it is used. */
+static size_t machine_memory(void) {
+  long pages = sysconf(_SC_PHYS_PAGES), page = sysconf(_SC_PAGESIZE);
+  return pages > 0 && page > 0 ? (size_t)pages / 10 * 9 * (size_t)page : 0;
+}
+
 bool cli_run_open(cli_run *run, unsigned threads, size_t memory_limit, bool quiet) {
   *run = (cli_run){.quiet = quiet, .bar = !quiet && isatty(STDERR_FILENO), .started = batten_now()};
   long cores = sysconf(_SC_NPROCESSORS_ONLN);
   run->threads = threads ? threads : cores > 64 ? 64 : cores > 0 ? (unsigned)cores : 1;
   batten_context_options o = batten_context_options_default();
   o.threads = run->threads;
-  o.memory_limit = memory_limit;
+  o.memory_limit = memory_limit ? memory_limit : machine_memory();
   o.progress = show;
   o.progress_user = run;
   batten_status st = batten_context_new(&o, &run->ctx);
@@ -90,7 +97,8 @@ static void explain(const cli_run *run, batten_status status, char *text, size_t
       {"opt.spline.smoothing", "--smoothing"}, {"memory_limit", "--memory"},
       {"opt.orientation", "--orientation"},    {"opt.cell", "--cell"},
       {"opt.width, opt.height", "--size"},     {"opt.carrier", "--carrier"},
-      {", or opt.improve larger than 0", ""},
+      {", or opt.improve larger than 0", ""},  {"matrix.n: ", ""},
+      {"the context allows", "allowed are"},
   };
   const char *own = batten_error(run->ctx);
   bool points = strncmp(own, "points", 6) == 0 || strncmp(own, "matrix", 6) == 0 || strncmp(own, "seeds", 5) == 0;
@@ -105,7 +113,7 @@ static void explain(const cli_run *run, batten_status status, char *text, size_t
 
 int cli_run_failed(cli_run *run, batten_status status) {
   cli_run_clear(run);
-  if (status == BATTEN_E_CANCELLED && interrupted) {
+  if (interrupted) {
     cli_error("interrupted; nothing was written");
     return CLI_INTERRUPTED;
   }

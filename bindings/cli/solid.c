@@ -63,7 +63,7 @@ static const cli_option table[] = {
     {"cell", OPT_CELL, "LENGTH",
      "edge length of the mesh; default from the points' spacing, but at most\n1/120 of the diagonal of their box"},
     {"box", OPT_BOX, "X0,Y0[,Z0],X1,...", "cut the surface at this box; default: the points' box grown by 25 %"},
-    {"memory", OPT_MEMORY, "SIZE", "use at most so much, for instance 2G; default no limit"},
+    {"memory", OPT_MEMORY, "SIZE", "use at most so much, for instance 2G; default 90 % of what the machine has"},
     {"loo", OPT_LOO, "N", "leave-one-out errors of N points, all or none; default 256"},
     {"threads", OPT_THREADS, "N", "threads; default all cores (BLAS has its own: OPENBLAS_NUM_THREADS)"},
     {"view", OPT_VIEW, "AZ,EL", "direction of the picture's camera, degrees; default 35,22"},

@@ -133,7 +133,10 @@ run 1 "broken.xyz" inspect broken.xyz
 run 1 "none.ply" inspect none.ply
 printf 'hello\n' >hello.bin
 run 1 "hello.bin" inspect hello.bin
-rm -f broken.xyz flat.xyz hello.bin
+awk 'BEGIN { srand(1); for (i = 0; i < 150000; i++) print rand(), rand(), rand() }' >many.xyz
+run 1 "allowed are" solid many.xyz --memory 9G # a matrix of 45 GB: refused by its size
+check "and the text is in the words of the program" grep -q 'many.xyz: 150000 rows .*; raise --memory' err
+rm -f broken.xyz flat.xyz hello.bin many.xyz
 nothing_new "after all failures"
 
 # A failure after files were written in part: the older file of that name stays as it was.
