@@ -198,14 +198,15 @@ done:
 
 /* ---- the result ---- */
 
-/* w' K w = w' f - rho w' w, because P' w = 0. */
+/* w' K w = w' f - rho w' w, because P' w = 0. Where smoothing leaves next to nothing the difference is rounding, of
+ * either sign. */
 static double energy(const fit *t) {
   double sum = 0;
   for (size_t i = 0; i < t->system.rows; i++) {
     sum += t->w[i] * t->f[i];
     if (i < t->system.count) sum -= smoothing_at(t, i) * t->w[i] * t->w[i];
   }
-  return ldexp(sum, 2 * t->exponent);
+  return sum > 0 ? ldexp(sum, 2 * t->exponent) : 0;
 }
 
 /* f is free by now: it takes the gradient coefficients as [M][n]. */

@@ -60,7 +60,6 @@ void FORTRAN(dsytrs)(CH uplo, IN n, IN nrhs, const double *a, IN lda, IN ipiv, d
 void FORTRAN(dsycon)(CH uplo, IN n, const double *a, IN lda, IN ipiv, const double *anorm, double *rcond,
                      double *work, OUT iwork, OUT info, LEN);
 double FORTRAN(dlansy)(CH norm, CH uplo, IN n, const double *a, IN lda, double *work, LEN, LEN);
-double FORTRAN(dlange)(CH norm, IN m, IN n, const double *a, IN lda, double *work, LEN);
 void FORTRAN(dgeqp3)(IN m, IN n, double *a, IN lda, OUT jpvt, double *tau, double *work, IN lwork, OUT info);
 void FORTRAN(dgeqrf)(IN m, IN n, double *a, IN lda, double *tau, double *work, IN lwork, OUT info);
 void FORTRAN(dormqr)(CH side, CH trans, IN m, IN n, IN k, const double *a, IN lda, const double *tau, double *c,

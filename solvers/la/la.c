@@ -110,23 +110,6 @@ size_t batten_la_potrf(batten_la_real real, char uplo, size_t n, void *a, size_t
   return (size_t)info;
 }
 
-size_t batten_la_pftrf(batten_la_real real, size_t n, void *a) {
-  if (n == 0) return 0;
-  const double alpha = 1, beta = 0;
-  batten_la_int ni = to_int(n), info = 0;
-  IN_PRECISION(real, pftrf, "N", "L", &ni, (real_t *)a, &info, 1, 1);
-  assert(info >= 0);
-  return (size_t)info;
-}
-
-void batten_la_pftrs(batten_la_real real, size_t n, size_t nrhs, const void *a, void *b, size_t ldb) {
-  if (n == 0 || nrhs == 0) return;
-  const double alpha = 1, beta = 0;
-  batten_la_int ni = to_int(n), nr = to_int(nrhs), lb = to_ld(ldb), info = 0;
-  IN_PRECISION(real, pftrs, "N", "L", &ni, &nr, (const real_t *)a, (real_t *)b, &lb, &info, 1, 1);
-  assert(info == 0);
-}
-
 batten_status batten_la_pstrf(batten_context *ctx, size_t n, double *a, size_t lda, size_t *pivots, size_t *rank) {
   *rank = 0;
   if (n == 0) return BATTEN_OK;

@@ -41,11 +41,8 @@ void batten_la_syrk(batten_la_real real, char uplo, char trans, size_t n, size_t
 void batten_la_trsm(batten_la_real real, char side, char uplo, char trans, size_t m, size_t n, double alpha,
                     const void *a, size_t lda, void *b, size_t ldb);
 
-/* Cholesky. 0, or the 1-based order of the leading minor that is not positive. pftrf, pftrs: RFP storage, transr N,
- * uplo L. */
+/* Cholesky. 0, or the 1-based order of the leading minor that is not positive. */
 size_t batten_la_potrf(batten_la_real real, char uplo, size_t n, void *a, size_t lda);
-size_t batten_la_pftrf(batten_la_real real, size_t n, void *a);
-void batten_la_pftrs(batten_la_real real, size_t n, size_t nrhs, const void *a, void *b, size_t ldb);
 
 /* Cholesky with diagonal pivoting of a semidefinite matrix, upper triangle: P'AP = U'U with *rank rows of U, column j
  * of AP being column pivots[j] of A. Stops where the diagonal left is below n eps times the largest. */

@@ -444,6 +444,12 @@ static void test_smoothing(batten_context *ctx) {
   T_RATIO(fabs(value_at(ctx, s, at) - (x[1] + x[2] * at[0] + x[3] * at[1]) / x[0]), 1e-6,
           "rho = 1e9: least-squares plane");
   batten_spline_free(s);
+  for (double rho = 1e12; rho < 1e20; rho *= 3) {
+    s = fit(ctx, &d, 2, rho, &info);
+    T_CHECK(info.energy >= 0 && info.energy < 1e-9, "rho = %.0e: energy %.2g, rounding is not negative", rho,
+            info.energy);
+    batten_spline_free(s);
+  }
 
   double each[80];
   for (int i = 0; i < 80; i++) each[i] = i == 5 ? 100 : 0;

@@ -112,7 +112,7 @@ static void test_invariance(batten_context *ctx) {
 
 /* Units so large or small that products of entries leave the range of a double. */
 static void test_extreme_units(batten_context *ctx) {
-  static const int powers[][3] = {{700, 0, 0},    {-700, 0, 0},   {0, 900, 0},     {0, -900, 0},    {900, 900, 0},
+  static const int powers[][3] = {{700, 0, 0},     {-700, 0, 0},  {0, 900, 0},     {0, -900, 0},     {900, 900, 0},
                                   {-900, -900, 0}, {300, 0, 400}, {-300, 0, -400}, {-1030, -900, 0}, {0, 0, 900}};
   data d = make_data(17), e;
   double x[N * Q], y[N * Q];

@@ -197,7 +197,13 @@ static void test_extreme_units(batten_context *ctx) {
     }
 }
 
-/* The threads of the context change no bit (those of BLAS may). */
+/* A host's executor that runs the last task first. */
+static void backwards(void *user, size_t tasks, void (*task)(void *arg, size_t index), void *arg) {
+  *(size_t *)user += tasks;
+  while (tasks-- > 0) task(arg, tasks);
+}
+
+/* The threads of the context change no bit (those of BLAS may), and the order of the tasks neither. */
 static void test_threads(void) {
   static double w[MOST], other[MOST];
   double c[4];
@@ -208,6 +214,16 @@ static void test_threads(void) {
     if (threads > 1) T_CHECK(!memcmp(w, other, sizeof w), "same bits on %u threads", threads);
     batten_context_free(ctx);
   }
+  size_t tasks = 0;
+  batten_context_options o = batten_context_options_default();
+  batten_context *ctx = NULL;
+  o.threads = 3;
+  o.parallel_for = backwards;
+  o.parallel_user = &tasks;
+  batten_context_new(&o, &ctx);
+  solve_scene(ctx, &s, BATTEN_SADDLE_CHOLESKY_MIXED, other, c, NULL);
+  T_CHECK(!memcmp(w, other, sizeof w) && tasks > 16, "same bits on the host's executor, %zu tasks", tasks);
+  batten_context_free(ctx);
   scene_free(&s);
 }
 
