@@ -61,6 +61,7 @@ typedef struct batten_saddle_info {
 typedef struct batten_saddle batten_saddle;
 
 /* Bytes that factor and solve take at their peak, before anything is taken; SIZE_MAX on overflow. AUTO: as CHOLESKY.
+ * A fall-back takes what its own method takes, where the memory limit has room for it.
  * Packed: about 4 N^2 (double) or 2 N^2 (mixed); LDL': 8 (N+k)^2; QR: 8 (N+k)^2. */
 BATTEN_API size_t batten_saddle_bytes(batten_saddle_method method, size_t n, size_t k);
 
