@@ -162,8 +162,8 @@ batten_status batten_polygonize_warn(batten_context *ctx, const batten_polygoniz
                        info->distance_max, tolerance);
   if (info->self_intersections)
     return batten_fail(ctx, BATTEN_W_ACCURACY,
-                       "the surface crosses itself at %zu pairs of triangles; make opt.cell smaller than %g, or "
-                       "opt.improve larger than 0",
+                       "the surface crosses itself at %zu pairs of triangles: parts or gaps of it are too thin for "
+                       "opt.cell; make that smaller than %g",
                        info->self_intersections, info->cell);
   if (info->clipped)
     return batten_fail(ctx, BATTEN_W_CLIPPED,

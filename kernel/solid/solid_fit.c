@@ -330,8 +330,9 @@ static batten_status ambiguous(const fit_state *f) {
       "of neighbours contradict each other, %zu pieces of f = 0 without data, %zu cells of f = 0 far "
       "from data; %s",
       f->data.count, c->weak_gradients, c->flipped_neighbours, c->phantom_components, c->phantom_cells,
-      f->orientation == BATTEN_ORIENTATION_GIVEN ? "check that opt.normals point outwards"
-                                                 : "give opt.normals, or more points where it is thin");
+      f->orientation == BATTEN_ORIENTATION_GIVEN
+          ? "check that opt.normals point outwards, or give more points where the surface is open"
+          : "give opt.normals, or more points where the surface is thin or open");
 }
 
 static batten_status finish(fit_state *f) {
@@ -358,9 +359,10 @@ static batten_status finish(fit_state *f) {
   double miss = fmin(info->residual_max, info->spline.residual_max);
   if (miss <= RESIDUAL) return BATTEN_OK;
   return batten_fail(f->ctx, BATTEN_W_ACCURACY,
-                     "points: |f| is up to %.3g of the values' range; merge close points, or "
-                     "smooth",
-                     miss);
+                     "points: |f| is up to %.3g of the values' range, %g allowed, and the surface up to %.3g away "
+                     "from them; give %sopt.merge_radius or opt.spline.smoothing",
+                     miss, RESIDUAL, info->distance_max,
+                     info->orient_data == BATTEN_ORIENT_DATA_GRADIENTS ? "opt.orient_data pairs, " : "");
 }
 
 /* Whether to start from oriented data without asking the carrier. */

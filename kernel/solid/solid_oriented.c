@@ -113,6 +113,11 @@ batten_status batten_solid_fit_gradients(batten_context *ctx, const surface_data
   data.gradient_count = d->count;
   data.gradients = normals;
   st = batten_spline_fit(ctx, &data, &o, &spline, info);
+  if (st == BATTEN_E_SINGULAR) /* its text names an order that the caller has not chosen */
+    st = batten_fail(ctx, st,
+                     "points: with their normals as gradients the system of %zu points is singular to working "
+                     "precision; set opt.orient_data to pairs, or give opt.merge_radius or opt.spline.smoothing",
+                     d->count);
   if (st >= 0) st = batten_carrier_none(ctx, d->n, &none);
   if (st >= 0) st = batten_solid_new(ctx, spline, none, 1, d->count, d->points, d->lower, d->upper, out);
   if (st >= 0) *value_range = fmax(range_of(c.count, c.values), d->radius);

@@ -159,6 +159,54 @@ static void test_given(batten_context *ctx) {
   T_CHECK(info.orientation == BATTEN_ORIENTATION_GIVEN && info.sign == BATTEN_SIGN_AMBIGUOUS,
           "inward normals are told");
   batten_solid_free(s);
+  o.orientation = BATTEN_ORIENT_AUTO;
+  T_OK(batten_solid_fit(ctx, 3, 200, points, &o, &s, &info), ctx);
+  T_CHECK(info.orientation == BATTEN_ORIENTATION_NONE && info.check.clean, "auto has no need of them");
+  batten_solid_free(s);
+}
+
+/* No solid has these points: however the surface closes, it does so far from data. */
+static void test_open(batten_context *ctx) {
+  batten_solid_options o = batten_solid_options_default();
+  batten_solid *s = NULL;
+  batten_solid_info info;
+  scene_sphere_points(4, 300, points);
+  for (size_t i = 0; i < 300; i++) points[3 * i + 2] = fabs(points[3 * i + 2]);
+  memcpy(normals, points, 900 * sizeof *points);
+  for (int k = 0; k < 2; k++) {
+    o.normals = k ? normals : NULL;
+    T_STATUS(batten_solid_fit(ctx, 3, 300, points, &o, &s, &info), BATTEN_W_AMBIGUOUS, ctx, "surface is");
+    T_CHECK(info.check_final.phantom_cells > 20, "hemisphere without its base, normals %s: %zu cells without data",
+            k ? "given" : "estimated", info.check_final.phantom_cells);
+    batten_solid_free(s);
+  }
+}
+
+/* What the solver cannot reach is told, with the length that matters and what to do. */
+static void test_accuracy(batten_context *ctx) {
+  batten_solid_options o = batten_solid_options_default();
+  batten_solid *s = NULL;
+  batten_solid_info info;
+  scene_sphere_points(4, 300, points);
+  o.spline.saddle.method = BATTEN_SADDLE_CHOLESKY_MIXED;
+  o.spline.saddle.refine_max = 0;
+  T_STATUS(batten_solid_fit(ctx, 3, 300, points, &o, &s, &info), BATTEN_W_ACCURACY, ctx, "1e-10 allowed");
+  T_CHECK(info.residual_max > 1e-10 && info.distance_max > 0 && info.distance_max < 1e-4 && info.check_final.clean,
+          "a float factor alone: f at the points %.2g, the surface %.2g away", info.residual_max, info.distance_max);
+  batten_solid_free(s);
+  /* Two points close together: as gradients the system loses its digits; the text offers what works. */
+  o = batten_solid_options_default();
+  memcpy(points, points + 3, 3 * sizeof *points);
+  points[0] += 1e-6;
+  o.normals = points;
+  o.orientation = BATTEN_ORIENT_GIVEN;
+  o.orient_data = BATTEN_ORIENT_DATA_GRADIENTS;
+  s = NULL;
+  T_STATUS(batten_solid_fit(ctx, 3, 300, points, &o, &s, NULL), BATTEN_E_SINGULAR, ctx,
+           "set opt.orient_data to pairs");
+  o.orient_data = BATTEN_ORIENT_DATA_PAIRS;
+  T_OK(batten_solid_fit(ctx, 3, 300, points, &o, &s, NULL), ctx);
+  batten_solid_free(s);
 }
 
 /* m = 3 cannot take its sign from a quadratic: refused by name, cured by itself with the automatic carrier; a carrier
@@ -382,6 +430,8 @@ int main(void) {
   test_clean(ctx);
   test_cured(ctx);
   test_given(ctx);
+  test_open(ctx);
+  test_accuracy(ctx);
   test_smoother(ctx);
   test_inside_out(ctx);
   test_bodies(ctx);

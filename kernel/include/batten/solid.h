@@ -53,9 +53,10 @@ typedef enum batten_sign_state {
 typedef struct batten_solid_options {
   size_t struct_size;
   const batten_carrier *carrier; /* NULL = auto: batten_carrier_fit */
-  const double *normals;         /* [N][n] outward, any positive length; NULL = none. They decide: turned inwards they
-                                    make the outside the solid, which the check reports as ambiguous, because f is
-                                    held negative far away */
+  const double *normals;         /* [N][n] outward, any positive length; NULL = none. AUTO looks at them only where
+                                    the check asks for it. Where they are used they decide: turned inwards they make
+                                    the outside the solid, which the check reports as ambiguous, because f is held
+                                    negative far away */
   double merge_radius;           /* points closer than this become one, the first given stays; caller's unit, >= 0.
                                     Default 0: only points equal to within 1e-12 of the box merge */
   batten_orientation orientation;
