@@ -92,9 +92,9 @@ typedef struct picture_buffer {
 batten_status picture_rasterize(batten_context *ctx, const picture_scene *scene, const picture_camera *camera,
                                 picture_buffer *buffer);
 /* Depth of a scene seen from infinity along a direction: map [size][size] over the square [-1, 1]^2 of (u, v), holds
- * the largest coordinate along d, -2 where there is nothing. */
+ * the largest coordinate along d, -2 where there is nothing. turned [vertex_count][3] is work space. */
 void picture_depth_map(const picture_scene *scene, const float u[3], const float v[3], const float d[3], size_t size,
-                       float *map);
+                       float *turned, float *map);
 batten_status picture_shade(batten_context *ctx, const picture_scene *scene, const picture_camera *camera,
                             const picture_buffer *buffer, picture_image *image);
 #endif

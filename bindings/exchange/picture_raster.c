@@ -152,17 +152,18 @@ batten_status picture_rasterize(batten_context *ctx, const picture_scene *scene,
 }
 
 void picture_depth_map(const picture_scene *s, const float u[3], const float v[3], const float d[3], size_t size,
-                       float *map) {
+                       float *turned, float *map) {
   for (size_t i = 0; i < size * size; i++) map[i] = -2;
+  for (size_t i = 0; i < s->vertex_count; i++) {
+    const float *p = s->vertices + 3 * i;
+    turned[3 * i] = (u[0] * p[0] + u[1] * p[1] + u[2] * p[2] + 1) * 0.5f * (float)size;
+    turned[3 * i + 1] = (v[0] * p[0] + v[1] * p[1] + v[2] * p[2] + 1) * 0.5f * (float)size;
+    turned[3 * i + 2] = d[0] * p[0] + d[1] * p[1] + d[2] * p[2];
+  }
   target t = {.width = size, .row_end = size, .depth = map};
   for (size_t f = 0; f < s->triangle_count; f++) {
-    float corner[3][3];
-    for (size_t k = 0; k < 3; k++) {
-      const float *p = s->vertices + 3 * (size_t)s->triangles[3 * f + k];
-      corner[k][0] = (u[0] * p[0] + u[1] * p[1] + u[2] * p[2] + 1) * 0.5f * (float)size;
-      corner[k][1] = (v[0] * p[0] + v[1] * p[1] + v[2] * p[2] + 1) * 0.5f * (float)size;
-      corner[k][2] = d[0] * p[0] + d[1] * p[1] + d[2] * p[2];
-    }
-    draw_triangle(&t, corner[0], corner[1], corner[2], 0);
+    const uint32_t *corner = s->triangles + 3 * f;
+    draw_triangle(&t, turned + 3 * (size_t)corner[0], turned + 3 * (size_t)corner[1], turned + 3 * (size_t)corner[2],
+                  0);
   }
 }

@@ -49,6 +49,7 @@ typedef struct shading {
   size_t beam_first, beam_end; /* the batch at work */
   float taps[TAPS][2];
   float *maps;        /* [BATCH][map][map] */
+  float *turned;      /* [BATCH][vertex_count][3] vertices in a beam's frame */
   size_t map, ground; /* sides of a depth map and of the ground's grid */
   float reach;        /* half the side of the ground's grid */
 } shading;
@@ -257,7 +258,8 @@ static void fill_row(void *arg, size_t y) {
 static void fill_map(void *arg, size_t index) {
   shading *s = arg;
   const beam *b = &s->beams[s->beam_first + index];
-  picture_depth_map(s->scene, b->u, b->v, b->d, s->map, s->maps + index * s->map * s->map);
+  picture_depth_map(s->scene, b->u, b->v, b->d, s->map, s->turned + 3 * index * s->scene->vertex_count,
+                    s->maps + index * s->map * s->map);
 }
 
 /* Part of a beam that reaches p: the four texels about it, each lit or not, blended. */
@@ -353,7 +355,7 @@ static float ground_light(const shading *s, size_t px, size_t py, float open) {
   return 1 - 0.85f * (1 - far) * (1 - fminf(1, part));
 }
 
-/* Bright parts bend towards white and do not burn out. */
+/* Bright parts bend and do not burn out. */
 static float expose(float v) {
   const float knee = 0.6f;
   return v <= knee ? v : knee + (1 - knee) * (1 - expf(-(v - knee) / (1 - knee)));
@@ -385,9 +387,12 @@ static void compose_row(void *arg, size_t y) {
       float height = p->position[2] - s->scene->ground;
       float bounce = 0.16f * (0.5f - 0.5f * p->normal[2]) * height / (height + 0.35f) + 0.05f;
       float gloss = 0.9f * p->gloss;
-      sum[0] += p->weight * expose(albedo.r * (p->light[0] + bounce) + gloss);
-      sum[1] += p->weight * expose(albedo.g * (p->light[1] + bounce) + gloss);
-      sum[2] += p->weight * expose(albedo.b * (p->light[2] + bounce) + gloss);
+      float shown[3] = {albedo.r * (p->light[0] + bounce) + gloss, albedo.g * (p->light[1] + bounce) + gloss,
+                        albedo.b * (p->light[2] + bounce) + gloss};
+      /* All channels by one factor: each by itself would turn the hue where the first of them bends. */
+      float brightest = fmaxf(shown[0], fmaxf(shown[1], shown[2]));
+      float factor = brightest > 0 ? p->weight * expose(brightest) / brightest : 0;
+      for (size_t c = 0; c < 3; c++) sum[c] += factor * shown[c];
     }
     left = fmaxf(0, left);
     for (size_t c = 0; c < 3; c++) rgb[c] = sum[c] + left * rgb[c];
@@ -407,7 +412,8 @@ batten_status picture_shade(batten_context *ctx, const picture_scene *scene, con
   make_taps(s->taps);
   s->row_first = batten_alloc_array(ctx, height + 1, sizeof *s->row_first);
   s->maps = batten_alloc_array(ctx, BATCH * s->map * s->map, sizeof *s->maps);
-  if (!s->row_first || !s->maps) goto done;
+  s->turned = batten_alloc_array(ctx, scene->vertex_count, BATCH * 3 * sizeof *s->turned);
+  if (!s->row_first || !s->maps || !s->turned) goto done;
   s->row_first[0] = 0;
   batten_parallel(ctx, height, count_row, s);
   for (size_t y = 0; y < height; y++) s->row_first[y + 1] += s->row_first[y];
@@ -428,6 +434,7 @@ batten_status picture_shade(batten_context *ctx, const picture_scene *scene, con
   st = batten_progress(ctx, "picture", 0.95);
 done:
   batten_free(ctx, s->points);
+  batten_free(ctx, s->turned);
   batten_free(ctx, s->maps);
   batten_free(ctx, s->row_first);
   batten_free(ctx, s);
