@@ -49,6 +49,16 @@ static inline void scene_sphere_points(uint64_t seed, size_t count, double *poin
   for (size_t i = 0; i < count; i++) scene_sphere_point(&seed, points + 3 * i);
 }
 
+/* Hollow ball: radii 1 and 0.5. Two sevenths of the points lie inside. */
+static inline double scene_shell(const double *p) {
+  double r = sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
+  return fmin(1 - r, r - 0.5);
+}
+static inline void scene_shell_points(uint64_t seed, size_t count, double *points) {
+  scene_sphere_points(seed, count, points);
+  for (size_t i = 0; i < 3 * (count * 2 / 7); i++) points[i] *= 0.5;
+}
+
 /* Torus of radii 1 and 0.4 about z. */
 static inline double scene_torus(const double *p) {
   double out = sqrt(p[0] * p[0] + p[1] * p[1]) - 1;

@@ -13,8 +13,8 @@ typedef struct shape {
   unsigned n;
   size_t (*points)(double *points); /* returns how many, 0 = not at hand */
   double (*truth)(const double *p); /* positive inside; NULL = not known */
-  size_t components;
-  long genus; /* in the plane: holes */
+  size_t components;                /* of the surface */
+  long genus;                       /* in the plane: holes */
 } shape;
 
 static size_t read_xyz(const char *name, double *points) {
@@ -33,6 +33,7 @@ static size_t read_xyz(const char *name, double *points) {
 static size_t thick_c(double *p) { return scene_c_points(59, p), (size_t)59; }
 static size_t two_contours(double *p) { return scene_pair_points(67, p), (size_t)67; }
 static size_t sphere(double *p) { return scene_sphere_points(1, 300, p), (size_t)300; }
+static size_t shell(double *p) { return scene_shell_points(1, 700, p), (size_t)700; }
 static size_t torus(double *p) { return scene_torus_points(1, 600, p), (size_t)600; }
 static size_t links(double *p) { return scene_links_points(1, 900, p), (size_t)900; }
 static size_t plate(double *p) { return scene_plate_points(1, p); }
@@ -53,6 +54,7 @@ static const shape shapes[] = {
     {"thick C, 59 points", 2, thick_c, scene_c, 1, 0},
     {"two contours, 67 points", 2, two_contours, scene_pair, 2, 0},
     {"sphere, 300 points", 3, sphere, scene_sphere, 1, 0},
+    {"hollow ball, 700 points", 3, shell, scene_shell, 2, 0},
     {"cube, 90 points", 3, cube, scene_cube, 1, 0},
     {"small moon, 942 points", 3, moon, scene_moon, 1, 0},
     {"torus, 600 points", 3, torus, scene_torus, 1, 1},
