@@ -124,27 +124,67 @@ size_t batten_rfp_weakest(const batten_rfp *b, double *ratio) {
 
 /* ---- Triangular solves ---- */
 
-void batten_rfp_forward(const batten_rfp *b, size_t m, void *x, size_t ldx) {
+/* One right side reads the factor once and is bound by memory: the small triangles on the diagonal are solved from
+ * cache, and everything beside them goes through products with a vector, which BLAS threads and its trsv does not. */
+static size_t block_at(size_t j, size_t n) { return n - j < BLOCK ? n - j : BLOCK; }
+
+static void forward_one(const batten_rfp *b, void *x) {
+  for (size_t j = 0; j < b->n1; j += BLOCK) {
+    size_t width = block_at(j, b->n1), below = j + width;
+    void *xj = batten_la_at(b->real, x, j);
+    batten_la_trsv(b->real, 'L', 'N', width, low(b, j, j), b->ld, xj);
+    if (below < b->n)
+      batten_la_gemv(b->real, 'N', b->n - below, width, -1, low(b, below, j), b->ld, xj, 1,
+                     batten_la_at(b->real, x, below));
+  }
   void *x2 = batten_la_at(b->real, x, b->n1);
-  if (m == 1) { /* a triangle is read once by trsv, copied first by trsm */
-    batten_la_trsv(b->real, 'L', 'N', b->n1, b->b11, b->ld, x);
-    batten_la_gemv(b->real, 'N', b->n2, b->n1, -1, b->b21, b->ld, x, 1, x2);
-    batten_la_trsv(b->real, 'U', 'T', b->n2, b->b22, b->ld, x2);
+  for (size_t j = 0; j < b->n2; j += BLOCK) {
+    size_t width = block_at(j, b->n2), right = j + width;
+    void *xj = batten_la_at(b->real, x2, j);
+    batten_la_trsv(b->real, 'U', 'T', width, high(b, j, j), b->ld, xj);
+    if (right < b->n2)
+      batten_la_gemv(b->real, 'T', width, b->n2 - right, -1, high(b, j, right), b->ld, xj, 1,
+                     batten_la_at(b->real, x2, right));
+  }
+}
+
+static void backward_one(const batten_rfp *b, void *x) {
+  void *x2 = batten_la_at(b->real, x, b->n1);
+  for (size_t end = b->n2; end > 0;) {
+    size_t j = (end - 1) / BLOCK * BLOCK, width = end - j;
+    void *xj = batten_la_at(b->real, x2, j);
+    batten_la_trsv(b->real, 'U', 'N', width, high(b, j, j), b->ld, xj);
+    if (j > 0) batten_la_gemv(b->real, 'N', j, width, -1, high(b, 0, j), b->ld, xj, 1, x2);
+    end = j;
+  }
+  for (size_t end = b->n1; end > 0;) {
+    size_t j = (end - 1) / BLOCK * BLOCK, width = end - j;
+    void *xj = batten_la_at(b->real, x, j);
+    if (end < b->n)
+      batten_la_gemv(b->real, 'T', b->n - end, width, -1, low(b, end, j), b->ld, batten_la_at(b->real, x, end), 1,
+                     xj);
+    batten_la_trsv(b->real, 'L', 'T', width, low(b, j, j), b->ld, xj);
+    end = j;
+  }
+}
+
+void batten_rfp_forward(const batten_rfp *b, size_t m, void *x, size_t ldx) {
+  if (m == 1) {
+    forward_one(b, x);
     return;
   }
+  void *x2 = batten_la_at(b->real, x, b->n1);
   batten_la_trsm(b->real, 'L', 'L', 'N', b->n1, m, 1, b->b11, b->ld, x, ldx);
   batten_la_gemm(b->real, 'N', 'N', b->n2, m, b->n1, -1, b->b21, b->ld, x, ldx, 1, x2, ldx);
   batten_la_trsm(b->real, 'L', 'U', 'T', b->n2, m, 1, b->b22, b->ld, x2, ldx);
 }
 
 void batten_rfp_backward(const batten_rfp *b, size_t m, void *x, size_t ldx) {
-  void *x2 = batten_la_at(b->real, x, b->n1);
   if (m == 1) {
-    batten_la_trsv(b->real, 'U', 'N', b->n2, b->b22, b->ld, x2);
-    batten_la_gemv(b->real, 'T', b->n2, b->n1, -1, b->b21, b->ld, x2, 1, x);
-    batten_la_trsv(b->real, 'L', 'T', b->n1, b->b11, b->ld, x);
+    backward_one(b, x);
     return;
   }
+  void *x2 = batten_la_at(b->real, x, b->n1);
   batten_la_trsm(b->real, 'L', 'U', 'N', b->n2, m, 1, b->b22, b->ld, x2, ldx);
   if (b->n2 > 0) batten_la_gemm(b->real, 'T', 'N', b->n1, m, b->n2, -1, b->b21, b->ld, x2, ldx, 1, x, ldx);
   batten_la_trsm(b->real, 'L', 'L', 'T', b->n1, m, 1, b->b11, b->ld, x, ldx);
