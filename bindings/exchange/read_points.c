@@ -44,6 +44,14 @@ static batten_status check_dimension(bx_reader *r, bx_soup *soup, unsigned n) {
   return n == 2 && soup->n == 3 ? flatten(r, soup) : BATTEN_OK;
 }
 
+/* Whether there is a normal for each point; columns of zeros, which some programs write for want of normals, are none. */
+static bool has_normals(const bx_soup *soup) {
+  if (soup->normal_count != soup->vertex_count) return false;
+  for (size_t i = 0; i < soup->n * soup->normal_count; i++)
+    if (soup->normals[i] != 0) return true;
+  return false;
+}
+
 batten_status bx_read_points_from(bx_reader *r, bx_format format, unsigned n, batten_cloud *out) {
   bx_soup soup = {.ctx = r->ctx};
   batten_status st = format == BX_TEXT  ? bx_read_text(r, &soup, n)
@@ -53,7 +61,7 @@ batten_status bx_read_points_from(bx_reader *r, bx_format format, unsigned n, ba
                                         : bx_read_stl(r, &soup);
   if (st == BATTEN_OK) st = check_dimension(r, &soup, n);
   if (st == BATTEN_OK) {
-    bool normals = soup.normal_count == soup.vertex_count;
+    bool normals = has_normals(&soup);
     *out = (batten_cloud){
         .n = soup.n, .count = soup.vertex_count, .points = soup.vertices, .normals = normals ? soup.normals : NULL};
     soup.vertices = NULL;

@@ -275,14 +275,14 @@ static batten_status orient(fit_state *f) {
 /* Gradients for up to so many points: their system is n + 1 times as large. */
 enum { GRADIENT_POINTS = 2000 };
 
-/* Fits with orientation, the other kind of data too when the first is not clean and the caller left the choice. Keeps
- * what has the fewest complaints; a cure that fails leaves the first fit. */
+/* Fits with orientation; few points also with the other kind of data, when the first is not clean and the caller left
+ * the choice. Keeps what has the fewest complaints; a cure that fails leaves the first fit. */
 static batten_status cure(fit_state *f) {
   batten_orient_data kinds[2] = {f->opt.orient_data, f->opt.orient_data};
   if (f->opt.orient_data == BATTEN_ORIENT_DATA_AUTO) {
     bool small = f->data.count <= GRADIENT_POINTS || f->data.n == 1;
     kinds[0] = small ? BATTEN_ORIENT_DATA_GRADIENTS : BATTEN_ORIENT_DATA_PAIRS;
-    kinds[1] = small ? BATTEN_ORIENT_DATA_PAIRS : BATTEN_ORIENT_DATA_GRADIENTS;
+    kinds[1] = BATTEN_ORIENT_DATA_PAIRS;
   }
   batten_status st = orient(f);
   for (int k = 0; st >= 0 && k < 2; k++) {

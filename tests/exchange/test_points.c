@@ -40,6 +40,7 @@ static const sample samples[] = {
     {"named_normals.csv", "nx, ny, nz, intensity, x, y, z\n0,0,1,7,1,2,3\n", 3, 1, {1, 2, 3}, {0, 0, 1}, true},
     {"comment_names.asc", "//X Y Z R G B\n1 2 3 255 0 0\n4 5 6 0 0 0\n", 3, 2, {1, 2, 3, 4, 5, 6}, {0}, false},
     {"comment_normals.txt", "# x y z nx ny nz\n1 2 3 0 0 1\n", 3, 1, {1, 2, 3}, {0, 0, 1}, true},
+    {"zero_normals.xyz", "1 2 3 0 0 0\n4 5 6 0 0 0\n", 3, 2, {1, 2, 3, 4, 5, 6}, {0}, false},
     {"comment_other.txt", "# x y are here\n1 2\n", 2, 1, {1, 2}, {0}, false},
     {"tabs.tsv", "1\t2\t3\n4\t5\t6\n", 3, 2, {1, 2, 3, 4, 5, 6}, {0}, false},
     {"blanks.csv", "1 , 2 , 3\n4 , 5 , 6 ,\n", 3, 2, {1, 2, 3, 4, 5, 6}, {0}, false},

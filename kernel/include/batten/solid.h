@@ -25,8 +25,8 @@ typedef enum batten_orientation {
 } batten_orientation;
 
 typedef enum batten_orient_data {
-  BATTEN_ORIENT_DATA_AUTO = 0,  /* gradients up to 2000 points, pairs above; the other where the check is not clean or
-                                   the system too ill-conditioned */
+  BATTEN_ORIENT_DATA_AUTO = 0,  /* gradients up to 2000 points, and pairs where the check is then not clean or the
+                                   system too ill-conditioned; above that pairs alone */
   BATTEN_ORIENT_DATA_GRADIENTS, /* Hermite-Birkhoff refit, no carrier, with the lowest order from m on whose kernel
                                    has two derivatives to spare (from m = 2: r^3, r^4 ln r) */
   BATTEN_ORIENT_DATA_PAIRS      /* refit with points off the surface, same kernel and carrier */

@@ -20,7 +20,7 @@ typedef struct batten_cloud {
   unsigned n;       /* 2 or 3 */
   size_t count;
   double *points;   /* [count][n] */
-  double *normals;  /* [count][n] or NULL */
+  double *normals;  /* [count][n] or NULL; columns of zeros count as none */
 } batten_cloud;
 
 typedef struct batten_read_points_options {
