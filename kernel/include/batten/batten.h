@@ -7,7 +7,9 @@
 #include <batten/carrier.h>
 #include <batten/field.h>
 #include <batten/lsq.h>
+#include <batten/matrix.h>
 #include <batten/mesh.h>
+#include <batten/qp.h>
 #include <batten/saddle.h>
 #include <batten/solid.h>
 #include <batten/spline.h>

@@ -34,13 +34,15 @@ extern "C" {
 
 /* The one list of status codes: X(name, value, text).
  * 0 done; negative: could not, and no output argument was touched (but the arrays of a
- * batch of field values: see <batten/field.h>); positive: done, outputs are valid, but
- * look at the result struct and at batten_error(). */
+ * batch of field values, see <batten/field.h>, and the proofs that a quadratic program
+ * gives, see <batten/qp.h>); positive: done, outputs are valid, but look at the result
+ * struct and at batten_error(). */
 #define BATTEN_STATUS_LIST(X)                                                            \
   X(BATTEN_OK, 0, "done")                                                                \
   X(BATTEN_W_ACCURACY, 1, "done, but a residual misses its tolerance")                   \
   X(BATTEN_W_AMBIGUOUS, 2, "done, but the sign of the solid is not settled by the data") \
   X(BATTEN_W_CLIPPED, 3, "done, but the surface is cut by its box")                      \
+  X(BATTEN_W_STOPPED, 4, "stopped at a feasible point that is not the optimum")          \
   X(BATTEN_E_INVALID, -1, "invalid argument")                                            \
   X(BATTEN_E_NOMEM, -2, "out of memory")                                                 \
   X(BATTEN_E_TOO_LARGE, -3, "too large")                                                 \
@@ -49,7 +51,11 @@ extern "C" {
   X(BATTEN_E_NOT_FOUND, -6, "nothing found")                                             \
   X(BATTEN_E_IO, -7, "file cannot be read or written")                                   \
   X(BATTEN_E_FORMAT, -8, "file content is not valid")                                    \
-  X(BATTEN_E_INTERNAL, -9, "internal error, please report")
+  X(BATTEN_E_INTERNAL, -9, "internal error, please report")                              \
+  X(BATTEN_E_INFEASIBLE, -10, "no point satisfies the constraints")                      \
+  X(BATTEN_E_UNBOUNDED, -11, "the objective falls without end")                          \
+  X(BATTEN_E_NOT_CONVEX, -12, "the objective is not convex")                             \
+  X(BATTEN_E_LIMIT, -13, "a limit was met before there was a result")
 
 typedef enum batten_status {
 #define BATTEN_STATUS_ENUM(name, value, text) name = value,
@@ -86,7 +92,8 @@ typedef struct batten_context_options {
   void *parallel_user;
 
   /* Called from time to time on the calling thread with the phase's name and the part done, in
-   * [0, 1]. Non-zero cancels: the call returns BATTEN_E_CANCELLED and leaves nothing behind. */
+   * [0, 1]. Non-zero cancels: the call returns BATTEN_E_CANCELLED and leaves nothing behind (a quadratic program that
+   * holds a feasible point returns that, with BATTEN_W_STOPPED). */
   int (*progress)(void *progress_user, const char *phase, double fraction);
   void *progress_user;
 } batten_context_options;

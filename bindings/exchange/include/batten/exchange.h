@@ -70,6 +70,34 @@ BATTEN_API batten_status batten_load_solid(batten_context *ctx, const char *path
 BATTEN_API batten_status batten_save_carrier(batten_context *ctx, const batten_carrier *carrier, const char *path);
 BATTEN_API batten_status batten_load_carrier(batten_context *ctx, const char *path, batten_carrier **out);
 
+/* ---- quadratic programs ------------------------------------------------------------------------- */
+
+/* A problem with the arrays that it points to. C and H are sparse where the file is. */
+typedef struct batten_qp_file {
+  batten_qp_problem problem;
+  double *x0;     /* [n] start of the file, or NULL; opt.x0 */
+  char *name;     /* of the problem, as the file says; "" = none */
+  char **unknown_names, **row_names; /* [n], [m] as the file says, or NULL */
+  void *memory;   /* batten's own */
+} batten_qp_file;
+
+/* .qps .sif .mps .QPS ... (fixed or free columns; the linear and quadratic part of SIF that the Maros-Meszaros problems
+ * use: NAME ROWS COLUMNS RHS RANGES BOUNDS QUADOBJ QMATRIX QSECTION ENDATA), .json (batten "qp"), .mat (MATLAB level 5
+ * with P q r l u A, as the Maros-Meszaros problems are handed on: single-entry rows of A become bounds), each also with
+ * .gz. Numbers of size 1e20 and more in bounds are infinite. Free with batten_qp_file_free. Fails: IO, FORMAT, INVALID
+ * (unknown extension: lists the known), NOMEM, TOO_LARGE, CANCELLED; *out untouched then. */
+BATTEN_API batten_status batten_read_qp(batten_context *ctx, const char *path, batten_qp_file *out);
+BATTEN_API void batten_qp_file_free(batten_context *ctx, batten_qp_file *file);
+
+/* .json {"batten": "qp", "version": 1, ...} or .qps (free columns, minimise; needs H and g: least squares are refused).
+ * Names may be NULL. Fails: IO, INVALID, NOMEM. */
+BATTEN_API batten_status batten_write_qp(batten_context *ctx, const batten_qp_file *file, const char *path);
+
+/* .json {"batten": "qp_solution", "version": 1, "status", "x", "multipliers", "active"} (or "certificate", "ray"), or
+ * .csv of x: NAME,VALUE a line. n and m are of the problem; arrays of solution that are NULL are left out. */
+BATTEN_API batten_status batten_write_qp_solution(batten_context *ctx, const batten_qp_file *file, batten_status status,
+                                                  const batten_qp_solution *solution, const char *path);
+
 /* What a file holds, by extension and content; only as much is read as that takes. Fails: IO, FORMAT. */
 typedef enum batten_file_kind {
   BATTEN_FILE_UNKNOWN = 0,
@@ -77,6 +105,7 @@ typedef enum batten_file_kind {
   BATTEN_FILE_MESH,
   BATTEN_FILE_SOLID,
   BATTEN_FILE_CARRIER,
+  BATTEN_FILE_QP,
   BATTEN_FILE_DOCUMENT /* another batten JSON document */
 } batten_file_kind;
 BATTEN_API batten_status batten_file_identify(batten_context *ctx, const char *path, batten_file_kind *out);
