@@ -180,7 +180,7 @@ static batten_status tell_carrier(cli_run *run, const char *path, bool print, cl
 }
 
 static int work(request *q) {
-  static const char *const kinds[] = {"unknown", "points", "mesh", "solid", "carrier", "document"};
+  static const char *const kinds[] = {"unknown", "points", "mesh", "solid", "carrier", "quadratic program", "document"};
   cli_run run;
   if (!cli_run_open(&run, (unsigned)q->threads, 0, q->quiet)) return CLI_FAILED;
   run.input = q->input;
@@ -209,6 +209,7 @@ static int work(request *q) {
       case BATTEN_FILE_CARRIER:
         st = tell_carrier(&run, q->input, print, &report);
         break;
+      case BATTEN_FILE_QP:
       case BATTEN_FILE_DOCUMENT:
         break;
       case BATTEN_FILE_UNKNOWN:
