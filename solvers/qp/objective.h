@@ -1,0 +1,36 @@
+/* The caller's objective 1/2 |W^1/2 (A x - b)|^2 + 1/2 x'H x + g'x as engines need it. P = A'WA + H, q = g - A'Wb. */
+#ifndef BATTEN_QP_OBJECTIVE_H
+#define BATTEN_QP_OBJECTIVE_H
+
+#include "engine.h"
+
+typedef struct qp_objective {
+  const batten_qp_problem *problem;
+  size_t n, k;       /* unknowns, rows of A */
+  double *metric;    /* [n] powers of two d_j > 0 of size sqrt(P_jj): d_j x_j are of size one; the proximal term is
+                        rho/2 |D (x - center)|^2 */
+  double *residual;  /* [k] scratch */
+} qp_objective;
+
+batten_status qp_objective_new(batten_context *ctx, const batten_qp_problem *problem, qp_objective *out);
+void qp_objective_free(batten_context *ctx, qp_objective *o);
+
+/* gradient [n] at x, and the value without the constant. */
+void qp_objective_gradient(const qp_objective *o, const double *x, double *gradient);
+double qp_objective_value(const qp_objective *o, const double *x);
+
+/* r [n][n] column-major: R'R = P + rho D^2. By QR of [W^1/2 A; U; rho^1/2 D] where there is A (U'U = H by pivoted Cholesky),
+ * else by Cholesky of H + rho D^2. base [n]: the c of rho's center 0, so that 1/2 |Rx - base|^2 is the objective + rho/2 |Dx|^2 up
+ * to a constant: Q'W^1/2 b - R^-T g, not through the normal equations. E_SINGULAR: R is (numerically) singular: take a larger
+ * rho. E_NOT_CONVEX: *index and ray [n], with d'H d < 0. */
+batten_status qp_objective_factor(batten_context *ctx, const qp_objective *o, double rho, double *r, double *base,
+                                  size_t *index, double *ray);
+/* target [n] := base + rho R^-T D^2 center: the objective + rho/2 |D (x - center)|^2. */
+void qp_objective_target(const qp_objective *o, double rho, const double *r, const double *base, const double *center,
+                         double *target);
+
+/* P and q as sparse matrix and vector; out's arrays are one allocation in *memory. */
+batten_status qp_objective_sparse(batten_context *ctx, const qp_objective *o, qp_sparse *out, batten_matrix *h,
+                                  void **memory);
+
+#endif
