@@ -1,8 +1,6 @@
 /* The workspace of quadratic programs: a context of its own whose memory hooks keep freed blocks for the next solve, so
  * that everything below allocates in the usual way, LAPACK's wrappers included, and a solve that takes the same sizes in
  * the same order takes nothing from the host. */
-#include <string.h>
-
 #include "base/checked.h"
 #include "base/context.h"
 #include "engine.h"
@@ -19,6 +17,14 @@ struct batten_qp_workspace {
   block *free_blocks;
 };
 
+static void drop_free_blocks(batten_qp_workspace *w) {
+  while (w->free_blocks) {
+    block *b = w->free_blocks;
+    w->free_blocks = b->next;
+    batten_free(w->outer, b);
+  }
+}
+
 /* A kept block serves a request of up to its size, if it wastes less than half. */
 static void *cache_allocate(void *user, size_t bytes) {
   batten_qp_workspace *w = user;
@@ -33,6 +39,10 @@ static void *cache_allocate(void *user, size_t bytes) {
     size_t all;
     if (!batten_add(bytes, HEADER, &all)) return NULL;
     taken = batten_alloc(w->outer, all);
+    if (!taken && w->free_blocks) { /* what is kept from problems of other sizes must not stand in the way */
+      drop_free_blocks(w);
+      taken = batten_alloc(w->outer, all);
+    }
     if (!taken) return NULL;
     taken->bytes = bytes;
   }
@@ -76,11 +86,7 @@ void batten_qp_workspace_free(batten_qp_workspace *workspace) {
   if (!workspace) return;
   batten_context *outer = workspace->outer;
   batten_context_free(workspace->inner);
-  while (workspace->free_blocks) {
-    block *b = workspace->free_blocks;
-    workspace->free_blocks = b->next;
-    batten_free(outer, b);
-  }
+  drop_free_blocks(workspace);
   batten_free(outer, workspace);
 }
 
