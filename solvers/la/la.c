@@ -110,7 +110,8 @@ size_t batten_la_potrf(batten_la_real real, char uplo, size_t n, void *a, size_t
   return (size_t)info;
 }
 
-batten_status batten_la_pstrf(batten_context *ctx, size_t n, double *a, size_t lda, size_t *pivots, size_t *rank) {
+batten_status batten_la_pstrf(batten_context *ctx, size_t n, double *a, size_t lda, double tolerance, size_t *pivots,
+                              size_t *rank) {
   *rank = 0;
   if (n == 0) return BATTEN_OK;
   batten_status st = BATTEN_E_NOMEM;
@@ -120,8 +121,7 @@ batten_status batten_la_pstrf(batten_context *ctx, size_t n, double *a, size_t l
   work = batten_alloc_array(ctx, n, 2 * sizeof *work);
   if (!work) goto done;
   batten_la_int ni = to_int(n), la = to_ld(lda), r = 0, info = 0;
-  const double default_tolerance = -1;
-  FORTRAN(dpstrf)("U", &ni, a, &la, piv, &r, &default_tolerance, work, &info, 1);
+  FORTRAN(dpstrf)("U", &ni, a, &la, piv, &r, &tolerance, work, &info, 1);
   for (size_t j = 0; j < n; j++) pivots[j] = (size_t)piv[j] - 1;
   *rank = (size_t)r;
   st = info < 0 ? illegal(ctx, "dpstrf", info) : BATTEN_OK; /* info 1: rank below n, no error here */

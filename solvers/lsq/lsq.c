@@ -142,7 +142,7 @@ static batten_status tension_rows(const problem *p, double *u, size_t *rank) {
   pivots = batten_alloc_array(p->ctx, n, sizeof *pivots);
   if (!pivots) goto done;
   memcpy(factor, p->tension, n * n * sizeof *factor);
-  st = batten_la_pstrf(p->ctx, n, factor, n, pivots, rank);
+  st = batten_la_pstrf(p->ctx, n, factor, n, -1, pivots, rank);
   if (st < 0) goto done;
   memset(u, 0, n * n * sizeof *u);
   for (size_t j = 0; j < n; j++)

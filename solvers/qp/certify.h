@@ -7,7 +7,9 @@
 #include <batten/qp.h>
 #include <stdbool.h>
 
-/* Fills objective, residuals, gap and scales of info at x [n] and y [m + n]. work [2 n]. */
+/* Fills objective, residuals, gap and scales of info at x [n] and y [m + n]; y NULL = zeros. work [2 n]. The gap is
+ * |gradient'x - sum of y_i side_i|, its scale the largest of |x'Px|, |q'x| and |sum of y_i side_i| (P = A'WA + H,
+ * q = g - A'Wb). A y_i whose side is infinite is charged to the dual residual and adds nothing to the gap. */
 void qp_certify_residuals(const batten_qp_problem *problem, const double *x, const double *y, double *work,
                           batten_qp_info *info);
 /* Whether info's residuals are within the tolerances; the second: the primal one alone. */

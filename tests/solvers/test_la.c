@@ -130,7 +130,7 @@ static void test_empty(batten_context *ctx) {
   T_OK(batten_la_geqrf(ctx, 0, 0, NULL, 0, NULL), ctx);
   T_OK(batten_la_ormqr(ctx, 'T', 0, 0, 0, NULL, 0, NULL, NULL, 0), ctx);
   T_OK(batten_la_trcon(ctx, 0, NULL, 0, &rcond), ctx);
-  T_OK(batten_la_pstrf(ctx, 0, NULL, 0, NULL, &rank), ctx);
+  T_OK(batten_la_pstrf(ctx, 0, NULL, 0, -1, NULL, &rank), ctx);
   T_OK(batten_la_norm1_estimate(ctx, 0, NULL, NULL, &norm), ctx);
   T_CHECK(rank == 0 && norm == 0 && batten_la_sytrf_work(0) == 1 && batten_la_geqrf_work(0, 0) == 1 &&
               batten_la_ormqr_work('N', 0, 0, 0) == 1,
