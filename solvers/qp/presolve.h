@@ -7,11 +7,12 @@
 /* One constraint of the core may take its two sides from two constraints of the caller (parallel rows are merged, rows of
  * one entry become bounds). Constraints of the caller are numbered as in batten_qp_solution: rows, then unknowns. */
 typedef struct qp_presolve {
+  const batten_qp_problem *problem;
   qp_rows rows;
   size_t *row;
   uint32_t *identity;
   double *scale, *lower, *upper;
-  size_t *lower_from, *upper_from;     /* [m] the caller's constraint behind each side */
+  size_t *lower_from, *upper_from;     /* [m] the caller's constraint behind each side; SIZE_MAX = no such side */
   double *lower_factor, *upper_factor; /* [m] its multiplier = factor * the core's; negative where the row was turned round */
 } qp_presolve;
 
@@ -22,10 +23,11 @@ batten_status qp_presolve_new(batten_context *ctx, const batten_qp_problem *prob
                               double *certificate);
 void qp_presolve_free(batten_context *ctx, qp_presolve *p);
 
-/* Multipliers and working set of the core -> the caller's ([m + n] each). */
+/* Multipliers and working set of the core -> the caller's ([m + n] each); either pair may be NULL. A multiplier of a sign
+ * that the constraint has no side for is dropped. */
 void qp_presolve_back(const qp_presolve *p, const double *y, const signed char *active, double *caller_y,
                       signed char *caller_active);
-/* The caller's working set -> the core's. */
+/* The caller's working set -> the core's; what back gave comes back as it was. */
 void qp_presolve_forward(const qp_presolve *p, const signed char *caller_active, signed char *active);
 
 #endif
