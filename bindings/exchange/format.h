@@ -16,7 +16,9 @@ typedef enum bx_format {
   BX_VTP,
   BX_VTU,
   BX_SVG,
-  BX_JSON
+  BX_JSON,
+  BX_QPS, /* .qps .sif .mps */
+  BX_MAT
 } bx_format;
 
 /* By the extension, in any case of letters; a last .gz is looked through when gz is not NULL, and then told. */
@@ -30,5 +32,6 @@ batten_status bx_read_points_from(bx_reader *r, bx_format format, unsigned n, ba
 batten_status bx_read_mesh_from(bx_reader *r, bx_format format, batten_mesh **out);
 batten_status bx_load_solid_from(bx_reader *r, batten_solid **out);
 batten_status bx_load_carrier_from(bx_reader *r, batten_carrier **out);
+batten_status bx_read_qp_from(bx_reader *r, bx_format format, batten_qp_file *out);
 
 #endif

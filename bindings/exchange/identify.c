@@ -32,6 +32,7 @@ static batten_file_kind kind_of_document(const unsigned char *bytes, size_t coun
     return BATTEN_FILE_UNKNOWN;
   if (take_text(bytes, count, &at, "solid")) return BATTEN_FILE_SOLID;
   if (take_text(bytes, count, &at, "carrier")) return BATTEN_FILE_CARRIER;
+  if (take_text(bytes, count, &at, "qp")) return BATTEN_FILE_QP;
   return BATTEN_FILE_DOCUMENT;
 }
 
@@ -80,6 +81,10 @@ static batten_status identify(bx_reader *r, bx_format format, batten_file_kind *
       return BATTEN_OK;
     case BX_STL:
       *out = BATTEN_FILE_MESH;
+      return BATTEN_OK;
+    case BX_QPS:
+    case BX_MAT:
+      *out = BATTEN_FILE_QP;
       return BATTEN_OK;
     case BX_PLY:
       return identify_ply(r, out);

@@ -198,3 +198,15 @@ batten_status bx_get_rows(bx_json *j, const json_t *object, const char *key, siz
   bx_leave(j, mark);
   return st;
 }
+
+batten_status bx_check_head(bx_json *j, const json_t *root, const char *kind) {
+  const char *given = "";
+  int64_t version;
+  char quote[BX_QUOTE_SIZE];
+  snprintf(j->place, sizeof j->place, "document");
+  batten_status st = bx_get_text(j, root, "batten", &given);
+  if (st == BATTEN_OK && strcmp(given, kind))
+    st = bx_json_fail(j, "it holds a batten '%s', not a %s", bx_quote(given, strlen(given), quote), kind);
+  if (st == BATTEN_OK) st = bx_get_whole(j, root, "version", 1, 1, &version);
+  return st;
+}

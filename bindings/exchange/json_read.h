@@ -23,6 +23,9 @@ void bx_leave(bx_json *j, size_t mark);
 
 batten_status bx_json_fail(bx_json *j, const char *format, ...) BATTEN_PRINTF(2, 3);
 
+/* The document's "batten": KIND, "version": 1. */
+batten_status bx_check_head(bx_json *j, const json_t *root, const char *kind);
+
 /* A member that must be there. */
 batten_status bx_get(bx_json *j, const json_t *object, const char *key, json_t **out);
 batten_status bx_get_text(bx_json *j, const json_t *object, const char *key, const char **out);

@@ -232,24 +232,11 @@ static batten_status load_solid_members(bx_json *j, const json_t *object, unsign
 
 /* ---- documents ---------------------------------------------------------------------------------- */
 
-/* "batten": KIND, "version": 1 */
-static batten_status check_head(bx_json *j, const json_t *root, const char *kind) {
-  const char *given = "";
-  int64_t version;
-  char quote[BX_QUOTE_SIZE];
-  snprintf(j->place, sizeof j->place, "document");
-  batten_status st = bx_get_text(j, root, "batten", &given);
-  if (st == BATTEN_OK && strcmp(given, kind))
-    st = bx_json_fail(j, "it holds a batten '%s', not a %s", bx_quote(given, strlen(given), quote), kind);
-  if (st == BATTEN_OK) st = bx_get_whole(j, root, "version", 1, 1, &version);
-  return st;
-}
-
 batten_status bx_load_solid_from(bx_reader *r, batten_solid **out) {
   bx_json j = {.ctx = r->ctx, .path = r->path};
   json_t *root = NULL;
   batten_status st = bx_json_parse(r, &root);
-  if (st == BATTEN_OK) st = check_head(&j, root, "solid");
+  if (st == BATTEN_OK) st = bx_check_head(&j, root, "solid");
   snprintf(j.place, sizeof j.place, "solid");
   if (st == BATTEN_OK) st = load_solid_members(&j, root, 0, out);
   json_decref(root);
@@ -261,7 +248,7 @@ batten_status bx_load_carrier_from(bx_reader *r, batten_carrier **out) {
   json_t *root = NULL;
   unsigned n = 0;
   batten_status st = bx_json_parse(r, &root);
-  if (st == BATTEN_OK) st = check_head(&j, root, "carrier");
+  if (st == BATTEN_OK) st = bx_check_head(&j, root, "carrier");
   if (st == BATTEN_OK) st = get_dimension(&j, root, &n);
   j.place[0] = '\0';
   if (st == BATTEN_OK) st = get_carrier(&j, root, n, 0, out);

@@ -14,4 +14,13 @@ void bx_put_numbers(bx_writer *w, const double *values, size_t count);
 void bx_write_vtp(bx_writer *w, const batten_mesh *mesh);
 void bx_write_vtu(bx_writer *w, const batten_mesh *mesh);
 
+/* A text of JSON in its quotes; it is UTF-8. */
+void bx_put_json_text(bx_writer *w, const char *text);
+
+void bx_write_json_qp(bx_writer *w, const batten_qp_file *file);
+void bx_write_json_qp_solution(bx_writer *w, size_t n, size_t m, batten_status status,
+                               const batten_qp_solution *solution);
+/* Needs memory of its own; NOMEM and INVALID are the writer's. */
+void bx_write_qps(bx_writer *w, const batten_qp_file *file);
+
 #endif

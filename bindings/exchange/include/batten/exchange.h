@@ -72,7 +72,7 @@ BATTEN_API batten_status batten_load_carrier(batten_context *ctx, const char *pa
 
 /* ---- quadratic programs ------------------------------------------------------------------------- */
 
-/* A problem with the arrays that it points to. C and H are sparse where the file is. */
+/* A problem with the arrays that it points to. Matrices are sparse, but those that a JSON document has as dense rows. */
 typedef struct batten_qp_file {
   batten_qp_problem problem;
   double *x0;     /* [n] start of the file, or NULL; opt.x0 */
@@ -81,20 +81,31 @@ typedef struct batten_qp_file {
   void *memory;   /* batten's own */
 } batten_qp_file;
 
-/* .qps .sif .mps .QPS ... (fixed or free columns; the linear and quadratic part of SIF that the Maros-Meszaros problems
- * use: NAME ROWS COLUMNS RHS RANGES BOUNDS QUADOBJ QMATRIX QSECTION ENDATA), .json (batten "qp"), .mat (MATLAB level 5
- * with P q r l u A, as the Maros-Meszaros problems are handed on: single-entry rows of A become bounds), each also with
- * .gz. Numbers of size 1e20 and more in bounds are infinite. Free with batten_qp_file_free. Fails: IO, FORMAT, INVALID
- * (unknown extension: lists the known), NOMEM, TOO_LARGE, CANCELLED; *out untouched then. */
+/* By extension, each also with .gz; docs/files.md has the rules:
+ *   .qps .sif .mps   fixed or free columns, told apart line by line: NAME OBJSENSE ROWS COLUMNS RHS RANGES BOUNDS QUADOBJ
+ *                    QMATRIX QSECTION ENDATA. A problem to be maximised comes as its negative. Integer unknowns and
+ *                    quadratic constraints are refused.
+ *   .json            batten "qp"
+ *   .mat             MATLAB level 5 with P q r l u A, as the Maros-Meszaros problems are handed on; where the last n rows
+ *                    of A are the identity, they are the bounds of x
+ * Bounds and sides of size 9e19 and more in QPS and MATLAB files are none (they mean 1e20, some less a constant). Free
+ * with batten_qp_file_free. Fails: IO, FORMAT, INVALID (unknown extension: lists the known), NOMEM, TOO_LARGE, CANCELLED;
+ * *out untouched then. While a JSON document is parsed, its tree is in memory that is not the context's. */
 BATTEN_API batten_status batten_read_qp(batten_context *ctx, const char *path, batten_qp_file *out);
+
+/* Frees what batten_read_qp made; a file that the caller has put together (memory = NULL) is only emptied. */
 BATTEN_API void batten_qp_file_free(batten_context *ctx, batten_qp_file *file);
 
-/* .json {"batten": "qp", "version": 1, ...} or .qps (free columns, minimise; needs H and g: least squares are refused).
- * Names may be NULL. Fails: IO, INVALID, NOMEM. */
+/* .json {"batten": "qp", "version": 1, ...}, which reads back to the same bits, or .qps .sif .mps (free columns,
+ * minimise; least squares are refused, x0 is left out, blanks in names become _; the second side of a row that has two
+ * is written as their distance, which may round). Names, name and x0 may be NULL, memory is not looked at.
+ * Fails: IO, INVALID, TOO_LARGE, NOMEM; what stood under the name is then as it was. */
 BATTEN_API batten_status batten_write_qp(batten_context *ctx, const batten_qp_file *file, const char *path);
 
-/* .json {"batten": "qp_solution", "version": 1, "status", "x", "multipliers", "active"} (or "certificate", "ray"), or
- * .csv of x: NAME,VALUE a line. n and m are of the problem; arrays of solution that are NULL are left out. */
+/* .json {"batten": "qp_solution", "version": 1, "status": WORD, "x", "multipliers", "active"} (or "certificate", or "ray",
+ * as the status has it), or .csv of x: NAME,VALUE a line, x1, x2, ... without names. n and m are of file->problem; arrays
+ * of solution that are NULL are left out. WORD: optimal, inaccurate, stopped, infeasible, unbounded, not convex, limit.
+ * Fails as batten_write_qp. */
 BATTEN_API batten_status batten_write_qp_solution(batten_context *ctx, const batten_qp_file *file, batten_status status,
                                                   const batten_qp_solution *solution, const char *path);
 
