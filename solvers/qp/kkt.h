@@ -1,0 +1,38 @@
+/* The interior point's linear systems
+ *
+ *   [ H + diag(d)    C'     ] [x]   [r]
+ *   [     C       -diag(w)  ] [p] = [s]      d >= 0, w > 0: quasidefinite, so that any symmetric order of pivots
+ * exists
+ *
+ * with fixed H and C and new d, w in every step, factored as L D L' in an order of little fill (ldl.c). */
+#ifndef BATTEN_QP_KKT_H
+#define BATTEN_QP_KKT_H
+
+#include "ordering.h"
+
+typedef struct qp_ldl qp_ldl;
+
+typedef struct qp_kkt {
+  size_t n, m;
+  qp_ldl *ldl;
+  double flops; /* of a factorization, as estimated */
+  size_t bytes; /* held */
+} qp_kkt;
+
+/* h: both triangles, m x m rows of c. The values are read at every factorization: the arrays must stay. */
+batten_status qp_kkt_new(batten_context *ctx, const qp_csr *h, const qp_csr *c, qp_kkt *out);
+void qp_kkt_free(batten_context *ctx, qp_kkt *k);
+
+/* Factors; returns how many pivots were repaired because rounding had eaten them. */
+size_t qp_kkt_factor(qp_kkt *k, const double *d, const double *w);
+/* r [n], s [m] -> x, p. */
+void qp_kkt_solve(qp_kkt *k, double *r, double *s);
+
+batten_status qp_ldl_new(batten_context *ctx, const qp_csr *h, const qp_csr *c, qp_ldl **out);
+void qp_ldl_free(batten_context *ctx, qp_ldl *f);
+size_t qp_ldl_factor(qp_ldl *f, const double *d, const double *w);
+void qp_ldl_solve(qp_ldl *f, double *r, double *s);
+double qp_ldl_flops(const qp_ldl *f);
+size_t qp_ldl_bytes(const qp_ldl *f);
+
+#endif

@@ -1,0 +1,88 @@
+/* Last digits of the interior point: the equality constrained problem of the active set that multipliers and slacks
+ * show, solved by the proximal method of multipliers (so that dependent rows do not matter), and the guess corrected
+ * as in a primal-dual active set method. A result is kept only if its figures are better. See interior.h. */
+#include <string.h>
+
+#include "interior.h"
+
+static const double NEVER = 1e30; /* w of rows that are not active: as good as no row */
+
+/* Residuals of the problem with the active rows as equations; returns their size. */
+static double residuals(const qp_scaled *s, const ip_polish_work *p, double *scratch) {
+  double size = 0;
+  qp_scaled_hessian(s, p->x, p->r1);
+  for (size_t j = 0; j < s->n; j++) p->r1[j] += s->g[j];
+  qp_scaled_add(s, -1, p->y, p->r1);
+  for (size_t j = 0; j < s->n; j++) {
+    p->r1[j] = -p->r1[j];
+    size = fmax(size, fabs(p->r1[j]));
+  }
+  qp_scaled_rows(s, p->x, scratch);
+  for (size_t k = 0; k < s->m; k++) {
+    double side = p->tried[k] == QP_UPPER ? s->upper[k] : s->lower[k];
+    p->r2[k] = p->tried[k] ? side - scratch[k] : 0;
+    size = fmax(size, fabs(p->r2[k]));
+  }
+  return size;
+}
+
+static void solve(ip_newton *k, ip_polish_work *p) {
+  const double REGULARIZATION = 1e-9;
+  const int ROUNDS = 8;
+  const qp_scaled *s = k->s;
+  double before = INFINITY;
+  k->rho = REGULARIZATION;
+  for (size_t i = 0; i < s->m; i++) k->w[i] = p->tried[i] ? REGULARIZATION : NEVER;
+  ip_newton_factor(k, 0, 0);
+  for (int round = 0; round < ROUNDS; round++) {
+    double size = residuals(s, p, k->q2);
+    if (!(size < 0.5 * before)) break;
+    before = size;
+    ip_newton_solve(k, p->r1, p->r2, p->dx, p->dy);
+    for (size_t j = 0; j < s->n; j++) p->x[j] += p->dx[j];
+    for (size_t i = 0; i < s->m; i++)
+      if (p->tried[i]) p->y[i] += p->dy[i];
+  }
+}
+
+/* Drops rows whose multipliers pull, takes those that are violated; returns how many. ax: rows at x. */
+static size_t change(const qp_scaled *s, ip_polish_work *p, const double *ax) {
+  size_t changes = 0;
+  for (size_t k = 0; k < s->m; k++) {
+    signed char now = p->tried[k];
+    if (now == QP_EQUAL) continue;
+    double room = 1e-12 * (1 + fabs(ax[k]));
+    if ((now == QP_LOWER && p->y[k] < 0) || (now == QP_UPPER && p->y[k] > 0))
+      now = QP_FREE;
+    else if (!now && ax[k] < s->lower[k] - room)
+      now = QP_LOWER;
+    else if (!now && ax[k] > s->upper[k] + room)
+      now = QP_UPPER;
+    if (now != p->tried[k]) changes++;
+    if (!now) p->y[k] = 0;
+    p->tried[k] = now;
+  }
+  return changes;
+}
+
+ip_figures ip_polish(ip_newton *k, ip_polish_work *p, ip_figures before, double enough, double *x, double *y,
+                     signed char *active, size_t rounds) {
+  const qp_scaled *s = k->s;
+  ip_figures best = before;
+  memcpy(p->tried, active, s->m);
+  memcpy(p->x, x, s->n * sizeof *x);
+  for (size_t i = 0; i < s->m; i++) p->y[i] = active[i] ? y[i] : 0;
+  for (size_t round = 0; round < rounds; round++) {
+    solve(k, p);
+    ip_figures f = ip_judge(s, p->x, p->y, p->r1, p->r2);
+    if (f.merit < best.merit) {
+      best = f;
+      memcpy(x, p->x, s->n * sizeof *x);
+      memcpy(y, p->y, s->m * sizeof *y);
+      memcpy(active, p->tried, s->m);
+    }
+    qp_scaled_rows(s, p->x, p->r2);
+    if (best.merit <= enough || !isfinite(f.merit) || change(s, p, p->r2) == 0) break;
+  }
+  return best;
+}
