@@ -381,18 +381,26 @@ bool qp_certify_unbounded(const batten_qp_problem *problem, double *d, double *w
   return isfinite(largest(n, d));
 }
 
+/* What rounding of the entries of H can hide is measured for each unknown: the entry's own, and that of computing with
+ * the largest one; but what is below 0 by a millionth of the diagonal's share is not rounding in whatever units. */
 bool qp_certify_not_convex(const batten_qp_problem *problem, const double *d) {
   const batten_qp_problem *p = problem;
+  const double FAR = 1e-6, OTHERS = (64 + (double)p->n) * DBL_EPSILON;
   if (!p->h) return false;
-  exact energy = {0, 0};
-  double size = 0;
+  double most = 0, hidden = 0;
   for (size_t i = 0; i < p->n; i++) {
-    if (d[i] == 0) continue;
     line l = line_of(p->h, i);
+    for (size_t e = 0; e < l.count; e++) most = larger(fabs(l.values[e]), most);
+  }
+  exact energy = {0, 0};
+  for (size_t i = 0; i < p->n; i++) {
+    line l = line_of(p->h, i);
+    double own = 0;
     for (size_t e = 0; e < l.count; e++)
-      if (column_of(&l, e) == i) size += fabs(l.values[e]) * d[i] * d[i];
-    energy = plus_multiple(energy, d[i], dot(p->h, i, d));
+      if (column_of(&l, e) == i) own = fabs(l.values[e]);
+    hidden += fmin(fmax(rounding(p) * own, OTHERS * most), FAR * own) * d[i] * d[i];
+    if (d[i] != 0) energy = plus_multiple(energy, d[i], dot(p->h, i, d));
   }
   /* a quarter: whoever proposes d may measure it by scales that are powers of two */
-  return value_of(energy) < -rounding(p) / 4 * size && isfinite(value_of(energy));
+  return value_of(energy) < 0 && value_of(energy) < -hidden / 4 && isfinite(value_of(energy));
 }

@@ -1,11 +1,12 @@
-/* Whether a symmetric matrix is positive semidefinite up to rounding, its root if so, a direction of negative curvature
- * if not.
+/* Whether a symmetric matrix is positive semidefinite up to rounding, a direction of negative curvature if not, its root
+ * if so.
  *
- * H is scaled to a diagonal of about one: S = E^-1 H E^-1, E powers of two. Cholesky with diagonal pivoting
- *   P'SP = [R11 R12]'[R11 R12] + [0 0; 0 L]      [Higham, Accuracy and Stability, 10.3]
- * stops where the diagonal left is rounding. If S is semidefinite all of the rest L is; if S has an eigenvalue -e then
- * L has one of -e or below, since w'Lw is the least of v'Sv over all v that end in w. So L's most negative direction w,
- * found by shifted power iteration, decides, and v = [-R11^-1 R12 w; w] is the direction for S. See objective.h. */
+ * H is scaled to a diagonal of about one: S = E^-1 H E^-1, E powers of two. What rounding can hide is a diagonal N:
+ * Cholesky of S + N ends if and only if no direction has v'Sv < -v'Nv, up to errors far below N. If it breaks down at
+ * unknown j, then R'R = S + N before j, and v = [-R^-1 R^-T s_j; 1; 0] is such a direction.
+ *
+ * The root comes from Cholesky with diagonal pivoting, P'SP = [R1 R2]'[R1 R2], which stops where the diagonal left is
+ * rounding [Higham, Accuracy and Stability, 10.3]. See objective.h. */
 #include <float.h>
 #include <string.h>
 
@@ -21,9 +22,9 @@ static const batten_la_real D = BATTEN_LA_DOUBLE;
 /* Power of two of size sqrt(square). */
 static double root_scale(double square) { return square > 0 ? 1 / batten_unit(sqrt(square)) : 0; }
 
-/* scale [n]: of size sqrt(H_jj); where that is not positive, as large as the row asks for, 1 for an empty row, and 0 for
+/* Returns the largest |H_ij|. scale [n]: of size sqrt(H_jj); where that is not positive, as large as the row asks for, 1 for an empty row, and 0 for
  * a row that is rounding beside the largest entry: it counts as empty. */
-static void set_scales(const batten_matrix *h, double *diagonal, double *scale) {
+static double set_scales(const batten_matrix *h, double *diagonal, double *scale) {
   size_t n = h->rows;
   double largest = 0;
   for (size_t i = 0; i < n; i++) {
@@ -49,6 +50,7 @@ static void set_scales(const batten_matrix *h, double *diagonal, double *scale) 
     else
       scale[i] = root_scale(fmax(wanted * wanted, fmax(fabs(diagonal[i]), diagonal[i] == 0 && wanted <= 0 ? most : 0)));
   }
+  return largest;
 }
 
 /* s [n][n] := E^-1 H E^-1, the mean of both triangles. */
@@ -67,137 +69,110 @@ static void scaled_matrix(const batten_matrix *h, const double *scale, double *s
   }
 }
 
-/* ---- The rest ---- */
+/* ---- Convexity ---- */
 
-/* rest [t][t] := S22 - R12'R12, all of it; returns its largest entry and where that is. */
-static double form_rest(size_t n, size_t rank, const double *s, const double *u, const size_t *pivots, double *rest,
-                        size_t at[2]) {
-  size_t t = n - rank;
-  double largest = 0;
-  at[0] = at[1] = 0;
-  for (size_t j = 0; j < t; j++)
-    for (size_t i = 0; i < t; i++) rest[i + j * t] = s[pivots[rank + i] + pivots[rank + j] * n];
-  if (rank > 0) batten_la_syrk(D, 'U', 'T', t, rank, -1, u + rank * n, n, 1, rest, t);
-  for (size_t j = 0; j < t; j++) {
-    for (size_t i = 0; i <= j; i++) {
-      rest[j + i * t] = rest[i + j * t];
-      if (fabs(rest[i + j * t]) <= largest) continue;
-      largest = fabs(rest[i + j * t]);
-      at[0] = i, at[1] = j;
-    }
-  }
-  return largest;
-}
-
-/* w'rest w / w'w; to := rest w */
-static double quotient(size_t t, const double *rest, const double *w, double *to) {
-  double energy = 0, square = 0;
-  batten_la_symv('U', t, 1, rest, t, w, 0, to);
-  for (size_t i = 0; i < t; i++) {
-    energy += w[i] * to[i];
-    square += w[i] * w[i];
-  }
-  return square > 0 ? energy / square : 0;
-}
-
-/* w [t] := direction of about the most negative curvature of rest, starting from the pair that holds its largest entry:
- * that alone has at least a t-th of it. */
-static double descend(size_t t, const double *rest, const size_t at[2], double *w, double *to) {
-  const size_t ROUNDS = 60;
-  double shift = 0, best = 0;
-  for (size_t i = 0; i < t; i++) shift += fmax(rest[i + i * t], 0); /* bounds the positive eigenvalues, nearly */
-  memset(w, 0, t * sizeof *w);
-  w[at[0]] = 1;
-  if (at[0] != at[1]) w[at[1]] = rest[at[0] + at[1] * t] > 0 ? -1 : 1;
-  best = quotient(t, rest, w, to);
-  for (size_t round = 0; round < ROUNDS; round++) {
-    double length = 0;
-    for (size_t i = 0; i < t; i++) to[i] -= shift * w[i];
-    for (size_t i = 0; i < t; i++) length = fmax(length, fabs(to[i]));
-    if (!(length > 0)) break;
-    for (size_t i = 0; i < t; i++) w[i] = to[i] / length;
-    double now = quotient(t, rest, w, to);
-    if (now >= best * (1 - 1e-3)) { /* no lower to speak of: both are negative */
-      best = fmin(best, now);
-      break;
-    }
-    best = now;
-  }
-  return best;
-}
-
-/* v [n] in the caller's unknowns from w: [-R11^-1 R12 w; w]. Returns v'Sv / v'v in scaled ones. */
-static double lift(size_t n, size_t rank, const double *u, const size_t *pivots, const double *scale, double quotient_of_w,
-                   const double *w, double *work, double *v, size_t *index) {
-  size_t t = n - rank;
-  double square = 0, square_of_w = 0, most = 0;
-  if (rank > 0) {
-    batten_la_gemv(D, 'N', rank, t, -1, u + rank * n, n, w, 0, work);
-    batten_la_trsv(D, 'U', 'N', rank, u, n, work);
-  }
-  memcpy(work + rank, w, t * sizeof *w);
-  for (size_t i = 0; i < n; i++) square += work[i] * work[i];
-  for (size_t i = 0; i < t; i++) {
-    square_of_w += w[i] * w[i];
-    if (fabs(w[i]) <= most) continue;
-    most = fabs(w[i]);
-    *index = pivots[rank + i];
-  }
-  for (size_t i = 0; i < n; i++) v[pivots[i]] = scale[pivots[i]] > 0 ? work[i] / scale[pivots[i]] : 0;
-  return quotient_of_w * (square_of_w / square);
+/* N_jj: what is put down to rounding of H's entries. They may be sums of some thousand products, or computed with errors
+ * relative to the largest of them; but what is far below 0 in scaled unknowns is believed in whatever units they are. */
+static double noise_of(size_t n, double largest, double scale) {
+  const double OWN = (1000 + 8 * (double)n) * DBL_EPSILON, OTHERS = (64 + (double)n) * DBL_EPSILON, FAR = 1e-6;
+  return fmin(fmax(OWN, OTHERS * (largest / scale / scale)), FAR);
 }
 
 static batten_status not_convex(batten_context *ctx, size_t index, double curvature) {
   return batten_fail(ctx, BATTEN_E_NOT_CONVEX,
-                     "h: curvature %.3g of its scale along a direction at unknown %zu; make it positive semidefinite",
+                     "h: curvature %.3g of its scale along a direction that ends in unknown %zu; make it positive "
+                     "semidefinite",
                      curvature, index);
 }
 
-/* NOT_CONVEX when the rest is negative somewhere beyond rounding. */
-static batten_status judge_rest(batten_context *ctx, size_t n, size_t rank, const double *s, const double *u,
-                                const size_t *pivots, const double *scale, size_t *index, double *ray) {
-  size_t t = n - rank, at[2];
-  const double noise = qp_curvature_noise(n);
-  if (t == 0) return BATTEN_OK;
+/* ray, its largest entry of size one: E^-1 v. */
+static void set_ray(size_t n, const double *scale, const double *v, double *ray) {
+  double most = 0;
+  for (size_t i = 0; i < n; i++) {
+    ray[i] = scale[i] > 0 ? v[i] / scale[i] : 0;
+    most = fmax(most, fabs(ray[i]));
+  }
+  for (size_t i = 0; i < n; i++) ray[i] *= batten_unit(most);
+}
+
+batten_status qp_hessian_convex(batten_context *ctx, const batten_matrix *h, size_t *index, double *ray) {
+  size_t n = h->rows;
+  if (!batten_la_fits(n)) return batten_fail(ctx, BATTEN_E_TOO_LARGE, "h: %zu rows; use the interior engine", n);
   batten_status st = BATTEN_E_NOMEM;
-  double *work = NULL, *rest = batten_alloc_array(ctx, t, t * sizeof *rest);
-  if (!rest) goto done;
-  work = batten_alloc_array(ctx, n, 4 * sizeof *work);
-  if (!work) goto done;
+  double *scale = NULL, *s = batten_alloc_array(ctx, n, n * sizeof *s);
+  if (!s) goto done;
+  scale = batten_alloc_array(ctx, n, 2 * sizeof *scale);
+  if (!scale) goto done;
+  double *v = scale + n, largest = set_scales(h, v, scale);
+  scaled_matrix(h, scale, s);
+  for (size_t j = 0; j < n; j++) s[j + j * n] += scale[j] > 0 ? noise_of(n, largest, scale[j]) : 1;
+  /* the lower triangle is left as it was: row j of it is s_j */
+  size_t broken = batten_la_potrf(D, 'U', n, s, n);
   st = BATTEN_OK;
-  if (form_rest(n, rank, s, u, pivots, rest, at) * (double)t <= noise) goto done;
-  double *w = work + n, *to = work + 2 * n, *v = work + 3 * n;
-  double lowest = descend(t, rest, at, w, to);
-  if (lowest >= 0) goto done;
-  size_t where = 0;
-  double curvature = lift(n, rank, u, pivots, scale, lowest, w, work, v, &where);
-  if (curvature >= -noise) goto done;
-  memcpy(ray, v, n * sizeof *ray);
-  *index = where;
-  st = not_convex(ctx, where, curvature);
+  if (broken == 0) goto done;
+  size_t j = broken - 1;
+  memset(v, 0, n * sizeof *v);
+  for (size_t i = 0; i < j; i++) v[i] = -s[j + i * n];
+  batten_la_trsv(D, 'U', 'T', j, s, n, v);
+  double square = 1, along = 0;
+  for (size_t i = 0; i < j; i++) along += v[i] * v[i];
+  batten_la_trsv(D, 'U', 'N', j, s, n, v);
+  for (size_t i = 0; i < j; i++) square += v[i] * v[i];
+  v[j] = 1;
+  set_ray(n, scale, v, ray);
+  *index = j;
+  st = not_convex(ctx, j, -along / square);
 done:
-  batten_free(ctx, work);
-  batten_free(ctx, rest);
+  batten_free(ctx, scale);
+  batten_free(ctx, s);
   return st;
 }
 
-batten_status qp_hessian_root(batten_context *ctx, const batten_matrix *h, double *u, size_t *rank, size_t *index,
-                              double *ray) {
+/* A minor of rows i and j is negative along (1, t) where that is least, or with t of size one if other is none. */
+batten_status qp_hessian_minors(batten_context *ctx, const batten_matrix *h, size_t *index, double *ray) {
+  size_t n = h->rows;
+  double *scale = batten_alloc_array(ctx, n, 2 * sizeof *scale);
+  if (!scale) return BATTEN_E_NOMEM;
+  batten_status st = BATTEN_OK;
+  double *diagonal = scale + n, largest = set_scales(h, diagonal, scale);
+  for (size_t i = 0; i < n && st >= 0; i++) {
+    qp_matrix_row row = qp_row_of(h, i);
+    if (scale[i] <= 0) continue;
+    double own = diagonal[i] / scale[i] / scale[i] + noise_of(n, largest, scale[i]);
+    for (size_t e = 0; e < row.count && st >= 0; e++) {
+      size_t j = qp_row_column(&row, e);
+      if (scale[j] <= 0) continue;
+      double other = diagonal[j] / scale[j] / scale[j] + noise_of(n, largest, scale[j]);
+      double off = row.values[e] / scale[i] / scale[j];
+      double t = i == j ? 0 : other > 0 ? -off / other : copysign(1, -off);
+      double least = i == j ? own : own + 2 * t * off + t * t * other;
+      if (least >= 0) continue;
+      double one = 1 / scale[i], two = i == j ? 0 : t / scale[j], unit = batten_unit(fmax(one, fabs(two)));
+      memset(ray, 0, n * sizeof *ray);
+      ray[i] = one * unit;
+      if (i != j) ray[j] = two * unit;
+      *index = i;
+      st = not_convex(ctx, i, least / (1 + t * t));
+    }
+  }
+  batten_free(ctx, scale);
+  return st;
+}
+
+/* ---- Root ---- */
+
+batten_status qp_hessian_root(batten_context *ctx, const batten_matrix *h, double *u, size_t *rank) {
   size_t n = h->rows, *pivots = NULL;
-  if (!batten_la_fits(n)) return batten_fail(ctx, BATTEN_E_TOO_LARGE, "h: %zu rows; use the interior engine", n);
   batten_status st = BATTEN_E_NOMEM;
-  double *scale = NULL, *s = u, *factor = batten_alloc_array(ctx, n, n * sizeof *factor);
+  double *scale = NULL, *factor = batten_alloc_array(ctx, n, n * sizeof *factor);
   if (!factor) goto done;
   scale = batten_alloc_array(ctx, n, 2 * sizeof *scale);
   if (!scale) goto done;
   pivots = batten_alloc_array(ctx, n, sizeof *pivots);
   if (!pivots) goto done;
   set_scales(h, scale + n, scale);
-  scaled_matrix(h, scale, s);
-  memcpy(factor, s, n * n * sizeof *factor);
+  scaled_matrix(h, scale, factor);
   st = batten_la_pstrf(ctx, n, factor, n, 4 * (double)n * DBL_EPSILON, pivots, rank);
-  if (st < 0) goto done;
-  st = judge_rest(ctx, n, *rank, s, factor, pivots, scale, index, ray);
   if (st < 0) goto done;
   memset(u, 0, n * n * sizeof *u);
   for (size_t j = 0; j < n; j++)
@@ -206,36 +181,5 @@ done:
   batten_free(ctx, pivots);
   batten_free(ctx, scale);
   batten_free(ctx, factor);
-  return st;
-}
-
-/* A minor of rows i and j is negative along (1, -t) with t of S_ij's sign and size one. */
-batten_status qp_hessian_minors(batten_context *ctx, const batten_matrix *h, size_t *index, double *ray) {
-  size_t n = h->rows;
-  double *scale = batten_alloc_array(ctx, n, 2 * sizeof *scale);
-  if (!scale) return BATTEN_E_NOMEM;
-  batten_status st = BATTEN_OK;
-  double *diagonal = scale + n, noise = qp_curvature_noise(n);
-  set_scales(h, diagonal, scale);
-  for (size_t i = 0; i < n && st >= 0; i++) {
-    qp_matrix_row row = qp_row_of(h, i);
-    if (scale[i] <= 0) continue;
-    double own = diagonal[i] / scale[i] / scale[i];
-    for (size_t e = 0; e < row.count && st >= 0; e++) {
-      size_t j = qp_row_column(&row, e);
-      if (scale[j] <= 0) continue;
-      double other = diagonal[j] / scale[j] / scale[j], off = row.values[e] / scale[i] / scale[j];
-      /* least of own + 2 t off + other t^2 over t, or at t = -+1 where other is none */
-      double t = i == j ? 0 : other > 0 ? -off / other : copysign(1, -off);
-      double least = i == j ? own : own + 2 * t * off + t * t * other;
-      if (least >= -noise * (1 + t * t)) continue;
-      memset(ray, 0, n * sizeof *ray);
-      ray[i] = 1 / scale[i];
-      if (i != j) ray[j] = t / scale[j];
-      *index = i;
-      st = not_convex(ctx, i, least / (1 + t * t));
-    }
-  }
-  batten_free(ctx, scale);
   return st;
 }

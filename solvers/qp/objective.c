@@ -233,22 +233,19 @@ done:
 }
 
 /* The triangle of A and H, made by the first call. */
-static batten_status make_triangle(batten_context *ctx, const qp_objective *o, size_t *index, double *ray) {
+static batten_status make_triangle(batten_context *ctx, const qp_objective *o) {
   struct qp_objective_state *state = o->state;
   if (state->triangle) return BATTEN_OK;
-  batten_status st;
+  batten_status st = BATTEN_OK;
   row_source source = {.o = o};
   double *root = NULL;
   if (o->problem->h) {
     root = batten_alloc_array(ctx, o->n, o->n * sizeof *root);
     if (!root) return BATTEN_E_NOMEM;
-    st = qp_hessian_root(ctx, o->problem->h, root, &source.rank, index, ray);
-    if (st < 0) goto done;
-    state->convex = true;
+    st = qp_hessian_root(ctx, o->problem->h, root, &source.rank);
     source.root = root;
   }
-  st = reduce_rows(ctx, &source, &state->triangle, &state->rows);
-done:
+  if (st >= 0) st = reduce_rows(ctx, &source, &state->triangle, &state->rows);
   batten_free(ctx, root);
   return st;
 }
@@ -313,12 +310,8 @@ static batten_status factor_hessian(batten_context *ctx, const qp_objective *o, 
 /* Whether H is semidefinite: once. */
 static batten_status check_hessian(batten_context *ctx, const qp_objective *o, size_t *index, double *ray) {
   if (o->state->convex) return BATTEN_OK;
-  size_t rank;
-  double *root = batten_alloc_array(ctx, o->n, o->n * sizeof *root);
-  if (!root) return BATTEN_E_NOMEM;
-  batten_status st = qp_hessian_root(ctx, o->problem->h, root, &rank, index, ray);
+  batten_status st = qp_hessian_convex(ctx, o->problem->h, index, ray);
   if (st >= 0) o->state->convex = true;
-  batten_free(ctx, root);
   return st;
 }
 
@@ -344,16 +337,16 @@ batten_status qp_objective_factor(batten_context *ctx, const qp_objective *o, do
   if (!shift) return BATTEN_E_NOMEM;
   memset(base, 0, n * sizeof *base);
   if (o->k > 0) {
-    st = make_triangle(ctx, o, index, ray);
+    st = check_hessian(ctx, o, index, ray);
+    if (st >= 0) st = make_triangle(ctx, o);
     if (st >= 0) st = factor_squares(ctx, o, rho, r, base);
   } else {
     st = factor_hessian(ctx, o, rho, r);
-    bool decided = st == BATTEN_OK && rho <= 0;
+    if (st == BATTEN_OK && rho <= 0) o->state->convex = true; /* the factor of H itself tells */
     if (st >= 0 || st == BATTEN_E_SINGULAR) {
-      batten_status convex = decided ? BATTEN_OK : check_hessian(ctx, o, index, ray);
+      batten_status convex = check_hessian(ctx, o, index, ray);
       if (convex < 0) st = convex;
     }
-    if (decided) o->state->convex = true;
   }
   if (st < 0) goto done;
   finish_factor(o, r, base);

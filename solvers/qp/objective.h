@@ -41,14 +41,12 @@ batten_status qp_objective_minors(batten_context *ctx, const qp_objective *o, si
 
 /* ---- hessian.c: a symmetric matrix alone ---- */
 
-/* u [n][n] column-major, its first *rank rows: U'U = H up to rounding, entries of column j being those of unknown j.
- * E_NOT_CONVEX as above. 2 n^2 doubles of memory besides. */
-batten_status qp_hessian_root(batten_context *ctx, const batten_matrix *h, double *u, size_t *rank, size_t *index,
-                              double *ray);
+/* E_NOT_CONVEX, *index, ray [n] as above, when H is not semidefinite up to rounding: some n^3/3 flops and n^2 doubles; and
+ * what can be told from the minors of two rows. */
+batten_status qp_hessian_convex(batten_context *ctx, const batten_matrix *h, size_t *index, double *ray);
 batten_status qp_hessian_minors(batten_context *ctx, const batten_matrix *h, size_t *index, double *ray);
-
-/* From where on v'Hv < 0 is not put down to rounding of H's entries: v'Hv < -qp_curvature_noise(n) * sum H_jj v_j^2.
- * Entries may be sums of some thousand products. */
-static inline double qp_curvature_noise(size_t n) { return (1000 + 8 * (double)n) * 0x1p-52; }
+/* u [n][n] column-major, its first *rank rows: U'U = H up to rounding, entries of column j being those of unknown j. H is
+ * semidefinite. */
+batten_status qp_hessian_root(batten_context *ctx, const batten_matrix *h, double *u, size_t *rank);
 
 #endif
