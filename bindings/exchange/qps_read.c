@@ -538,7 +538,7 @@ static void sides(const qps_row *row, double *lower, double *upper) {
   double rhs = row->rhs, range = row->range;
   *lower = row->type == 'L' ? -INFINITY : rhs;
   *upper = row->type == 'G' ? INFINITY : rhs;
-  if (!row->has_range) return;
+  if (!row->has_range || isinf(rhs)) return; /* a free row stays free */
   if (row->type == 'L') *lower = rhs - fabs(range);
   if (row->type == 'G') *upper = rhs + fabs(range);
   if (row->type == 'E' && range < 0) *lower = rhs + range;

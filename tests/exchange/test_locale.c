@@ -33,6 +33,16 @@ static void write_all(batten_context *ctx, scratch *s, const batten_mesh *mesh, 
   }
   snprintf(name, sizeof name, "carrier-%d.json", which);
   T_OK(batten_save_carrier(ctx, carrier, scratch_file(s, name)), ctx);
+  double g[] = {0.1, -2.5e-7}, upper[] = {1.75, INFINITY};
+  batten_qp_file qp = {.problem = {.struct_size = sizeof qp.problem, .n = 2, .g = g, .constant = 0.3, .x_upper = upper}};
+  for (size_t i = 0; i < 2; i++) {
+    snprintf(name, sizeof name, "qp-%d.%s", which, i ? "json" : "qps");
+    T_OK(batten_write_qp(ctx, &qp, scratch_file(s, name)), ctx);
+    batten_qp_file back = {0};
+    T_OK(batten_read_qp(ctx, s->name, &back), ctx);
+    T_CHECK(!memcmp(back.problem.g, g, sizeof g) && back.problem.x_upper[0] == 1.75, "%s: the same bits", name);
+    batten_qp_file_free(ctx, &back);
+  }
 }
 
 static bool same_files(scratch *s, const char *stem, const char *extension) {
@@ -91,7 +101,8 @@ int main(void) {
     T_CHECK(!strcmp(printed, "0,5") && !strcmp(text, "0.5"), "where printf writes %s, here it is %s", printed, text);
     write_all(ctx, &s, mesh, carrier, 1);
     T_CHECK(same_files(&s, "mesh", "obj") && same_files(&s, "mesh", "off") && same_files(&s, "mesh", "ply") &&
-                same_files(&s, "mesh", "vtp") && same_files(&s, "carrier", "json"),
+                same_files(&s, "mesh", "vtp") && same_files(&s, "carrier", "json") && same_files(&s, "qp", "qps") &&
+                same_files(&s, "qp", "json"),
             "the same bytes are written");
     test_reading(ctx, &s, x);
   } else {

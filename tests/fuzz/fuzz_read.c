@@ -74,12 +74,53 @@ static const char *load_carrier(bx_reader *r) {
   return st < 0 ? "a carrier that cannot be evaluated" : NULL;
 }
 
+static const char *check_matrix(const batten_matrix *m, size_t n) {
+  if (!m) return NULL;
+  if (m->columns != n) return "a matrix of another width";
+  size_t count = m->dense ? m->rows * n : m->starts[m->rows];
+  for (size_t i = 0; i < count; i++) {
+    if (!isfinite(m->dense ? m->dense[i] : m->values[i])) return "an entry that is not finite";
+    if (!m->dense && m->indices[i] >= n) return "an entry beyond the columns";
+  }
+  for (size_t i = 0; !m->dense && i < m->rows; i++)
+    if (m->starts[i] > m->starts[i + 1]) return "rows that go backwards";
+  return NULL;
+}
+
+static const char *check_sides(const double *lower, const double *upper, size_t count) {
+  for (size_t i = 0; i < count; i++)
+    if ((lower && !(lower[i] < INFINITY)) || (upper && !(upper[i] > -INFINITY))) return "a side that leaves nothing";
+  return NULL;
+}
+
+static const char *read_qp(bx_reader *r, bx_format format) {
+  batten_qp_file file = {0};
+  batten_status st = bx_read_qp_from(r, format, &file);
+  if (st != BATTEN_OK) return file.memory ? "a result in spite of a failure" : check_failure(r->ctx, st);
+  const batten_qp_problem *p = &file.problem;
+  const char *wrong = check_matrix(p->a, p->n);
+  if (!wrong) wrong = check_matrix(p->h, p->n);
+  if (!wrong) wrong = check_matrix(p->c, p->n);
+  if (!wrong) wrong = check_sides(p->lower, p->upper, p->c ? p->c->rows : 0);
+  if (!wrong) wrong = check_sides(p->x_lower, p->x_upper, p->n);
+  for (size_t j = 0; !wrong && j < p->n; j++)
+    if ((p->g && !isfinite(p->g[j])) || (file.unknown_names && !file.unknown_names[j])) wrong = "g or a name is wrong";
+  if (!isfinite(p->constant) || !file.name) wrong = "the constant or the name is wrong";
+  batten_qp_file_free(r->ctx, &file);
+  return wrong;
+}
+
 /* The readers of a format, by number; false when there are no more. */
 static bool read_once(bx_reader *r, bx_format format, unsigned which, const char **wrong) {
   *wrong = NULL;
+  if (format == BX_QPS || format == BX_MAT) {
+    if (which > 0) return false;
+    *wrong = read_qp(r, format);
+    return true;
+  }
   if (format == BX_JSON) {
-    if (which > 1) return false;
-    *wrong = which == 0 ? load_solid(r) : load_carrier(r);
+    if (which > 2) return false;
+    *wrong = which == 0 ? load_solid(r) : which == 1 ? load_carrier(r) : read_qp(r, format);
     return true;
   }
   if (which == 3 && format != BX_TEXT)
@@ -97,8 +138,9 @@ const char *fuzz_read(const char *name, const unsigned char *data, size_t size) 
   batten_context *ctx = NULL;
   if (batten_context_new(&o, &ctx) != BATTEN_OK) return NULL;
   const char *wrong = NULL;
-  bool gz = size >= 2 && data[0] == 0x1f && data[1] == 0x8b, more = true, named;
+  bool packed = size >= 2 && data[0] == 0x1f && data[1] == 0x8b, more = true, named;
   bx_format format = bx_format_of(name, &named);
+  for (size_t i = 0; format == BX_MAT && i < size; i++) packed = packed || data[i] == 0x0f; /* compressed elements */
   for (unsigned which = 0; more && !wrong; which++) {
     bx_reader r;
     batten_status st = bx_open_memory(&r, ctx, name, data, size);
@@ -110,7 +152,7 @@ const char *fuzz_read(const char *name, const unsigned char *data, size_t size) 
     bx_close(&r);
     if (!wrong && batten_bytes_in_use(ctx)) wrong = "memory is left";
     /* 400: a byte of text can be a corner that takes a triangle's 12, twice while it grows, and a slot's share */
-    if (!wrong && !gz && batten_bytes_peak(ctx) > (1 << 19) + 400 * size)
+    if (!wrong && !packed && batten_bytes_peak(ctx) > (1 << 19) + 400 * size)
       wrong = "more memory than the bytes account for";
   }
   batten_context_free(ctx);
