@@ -1,17 +1,17 @@
 /* The judge of quadratic programs: residuals, certificates and rays from the caller's arrays alone.
  *
  * Sums run in twice the working precision [Ogita, Rump, Oishi 2005, Dot2]: each product and each addition keeps its
- * rounding error, by fma() and by Knuth's TwoSum, so that bits are the same with and without FMA units. Rows that a plain
- * sum shows to hold by more than its error bound are not summed again. Nothing here is shared with the engines. See
- * certify.h. */
+ * rounding error, by fma() and by Knuth's TwoSum, so that bits are the same with and without FMA units. Rows that a
+ * plain sum shows to hold by more than its error bound are not summed again. Nothing here is shared with the engines.
+ * See certify.h. */
 #include "certify.h"
 
 #include <float.h>
 #include <math.h>
 #include <string.h>
 
-/* Relative size below which a quantity that should vanish, or one that should be positive, is put down to rounding in the
- * data and in the engine: entries may be sums of some thousand products. */
+/* Relative size below which a quantity that should vanish, or one that should be positive, is put down to rounding in
+ * the data and in the engine: entries may be sums of some thousand products. */
 static double rounding(const batten_qp_problem *p) { return (1000 + 8 * (double)p->n) * DBL_EPSILON; }
 
 /* ---- Sums in twice the working precision ---- */
@@ -185,7 +185,8 @@ static double gradient(const batten_qp_problem *p, const double *x, double *hi, 
     whole = plus_multiple(whole, 0.5 * x[j], hx);
   }
   for (size_t i = 0; i < rows_of(p->a); i++) {
-    exact r = normal(plus(dot(p->a, i, x), -target(p, i))), wr = normal(plus_multiple((exact){0, 0}, weight(p, i), r));
+    exact r = normal(plus(dot(p->a, i, x), -target(p, i))),
+          wr = normal(plus_multiple((exact){0, 0}, weight(p, i), r));
     add_row(p->a, i, wr, hi, lo);
     whole = plus_multiple(whole, 0.5 * r.hi, wr);
     whole.lo += 0.5 * r.lo * wr.hi;
@@ -209,8 +210,8 @@ static void add_multipliers(const batten_qp_problem *p, double factor, const dou
   }
 }
 
-/* Sum of y_i side_i. A multiplier without a side is charged to the dual residual; in the gap it takes the row's value, with
- * which it adds nothing. */
+/* Sum of y_i side_i. A multiplier without a side is charged to the dual residual; in the gap it takes the row's
+ * value, with which it adds nothing. */
 static exact sum_of_sides(const batten_qp_problem *p, const double *x, const double *y, double *unheld) {
   size_t m = rows_of(p->c);
   exact sum = {0, 0};
@@ -381,8 +382,9 @@ bool qp_certify_unbounded(const batten_qp_problem *problem, double *d, double *w
   return isfinite(largest(n, d));
 }
 
-/* What rounding of the entries of H can hide is measured for each unknown: the entry's own, and that of computing with
- * the largest one; but what is below 0 by a millionth of the diagonal's share is not rounding in whatever units. */
+/* What rounding of the entries of H can hide is measured for each unknown: the entry's own, and that of computing
+ * with the largest one; but what is below 0 by a millionth of the diagonal's share is not rounding in whatever units.
+ */
 bool qp_certify_not_convex(const batten_qp_problem *problem, const double *d) {
   const batten_qp_problem *p = problem;
   const double FAR = 1e-6, OTHERS = (64 + (double)p->n) * DBL_EPSILON;

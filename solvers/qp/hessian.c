@@ -1,5 +1,5 @@
-/* Whether a symmetric matrix is positive semidefinite up to rounding, a direction of negative curvature if not, its root
- * if so.
+/* Whether a symmetric matrix is positive semidefinite up to rounding, a direction of negative curvature if not, its
+ * root if so.
  *
  * H is scaled to a diagonal of about one: S = E^-1 H E^-1, E powers of two. What rounding can hide is a diagonal N:
  * Cholesky of S + N ends if and only if no direction has v'Sv < -v'Nv, up to errors far below N. If it breaks down at
@@ -22,8 +22,8 @@ static const batten_la_real D = BATTEN_LA_DOUBLE;
 /* Power of two of size sqrt(square). */
 static double root_scale(double square) { return square > 0 ? 1 / batten_unit(sqrt(square)) : 0; }
 
-/* Returns the largest |H_ij|. scale [n]: of size sqrt(H_jj); where that is not positive, as large as the row asks for, 1 for an empty row, and 0 for
- * a row that is rounding beside the largest entry: it counts as empty. */
+/* Returns the largest |H_ij|. scale [n]: of size sqrt(H_jj); where that is not positive, as large as the row asks
+ * for, 1 for an empty row, and 0 for a row that is rounding beside the largest entry: it counts as empty. */
 static double set_scales(const batten_matrix *h, double *diagonal, double *scale) {
   size_t n = h->rows;
   double largest = 0;
@@ -48,7 +48,8 @@ static double set_scales(const batten_matrix *h, double *diagonal, double *scale
     if (most <= 4 * DBL_EPSILON * largest)
       scale[i] = most > 0 ? 0 : 1;
     else
-      scale[i] = root_scale(fmax(wanted * wanted, fmax(fabs(diagonal[i]), diagonal[i] == 0 && wanted <= 0 ? most : 0)));
+      scale[i] =
+          root_scale(fmax(wanted * wanted, fmax(fabs(diagonal[i]), diagonal[i] == 0 && wanted <= 0 ? most : 0)));
   }
   return largest;
 }
@@ -71,8 +72,9 @@ static void scaled_matrix(const batten_matrix *h, const double *scale, double *s
 
 /* ---- Convexity ---- */
 
-/* N_jj: what is put down to rounding of H's entries. They may be sums of some thousand products, or computed with errors
- * relative to the largest of them; but what is far below 0 in scaled unknowns is believed in whatever units they are. */
+/* N_jj: what is put down to rounding of H's entries. They may be sums of some thousand products, or computed with
+ * errors relative to the largest of them; but what is far below 0 in scaled unknowns is believed in whatever units
+ * they are. */
 static double noise_of(size_t n, double largest, double scale) {
   const double OWN = (1000 + 8 * (double)n) * DBL_EPSILON, OTHERS = (64 + (double)n) * DBL_EPSILON, FAR = 1e-6;
   return fmin(fmax(OWN, OTHERS * (largest / scale / scale)), FAR);

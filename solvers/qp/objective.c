@@ -1,10 +1,10 @@
 /* The objective of a quadratic program: values from the caller's data, triangular factors for the dense engines.
  *
- * Unknowns are scaled by powers of two (metric) to columns of length about one, so that rank is judged alike in whatever
- * units they come. Sums of squares are brought to a triangle by Householder QR, rows by blocks, once for all rho:
- *   [W^1/2 A | W^1/2 b]             [T | t]                       [T         | t]
- *   [   U    |    0   ]   ->  QR -> [0 | *]      then for rho     [rho^1/2 I | 0]  -> QR -> [R | c]
- * with U'U = H, so that A'A, and with it the square of A's condition, never appears. See objective.h. */
+ * Unknowns are scaled by powers of two (metric) to columns of length about one, so that rank is judged alike in
+ * whatever units they come. Sums of squares are brought to a triangle by Householder QR, rows by blocks, once for all
+ * rho: [W^1/2 A | W^1/2 b]             [T | t]                       [T         | t] [   U    |    0   ]   ->  QR ->
+ * [0 | *]      then for rho     [rho^1/2 I | 0]  -> QR -> [R | c] with U'U = H, so that A'A, and with it the square
+ * of A's condition, never appears. See objective.h. */
 #include "objective.h"
 
 #include <float.h>

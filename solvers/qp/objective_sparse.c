@@ -1,8 +1,8 @@
 /* P = A'WA + H as compressed sparse rows, in time of the products that it takes and without anything [n][n].
  *
- * Row i of P gathers w_r A_ri A_r,: over the rows r of A that touch unknown i (Gustavson's algorithm on the columns of A),
- * then row i of H. Columns of a row come in the order of discovery; P is symmetric, so writing each row as a column,
- * rows in ascending order, leaves every row sorted. See objective.h. */
+ * Row i of P gathers w_r A_ri A_r,: over the rows r of A that touch unknown i (Gustavson's algorithm on the columns
+ * of A), then row i of H. Columns of a row come in the order of discovery; P is symmetric, so writing each row as a
+ * column, rows in ascending order, leaves every row sorted. See objective.h. */
 #include <string.h>
 
 #include "base/checked.h"

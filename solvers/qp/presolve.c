@@ -22,9 +22,9 @@ typedef struct presolver {
   batten_context *ctx;
   const batten_qp_problem *problem;
   qp_presolve *out;
-  size_t n, m, kept;    /* unknowns; the caller's rows; constraints so far */
-  double *random;       /* [n] in (-1, 1) */
-  double *work;         /* [n] zeros between uses */
+  size_t n, m, kept;                   /* unknowns; the caller's rows; constraints so far */
+  double *random;                      /* [n] in (-1, 1) */
+  double *work;                        /* [n] zeros between uses */
   double *x_lower, *x_upper;           /* [n] bounds as rows of one entry tighten them */
   size_t *x_lower_from, *x_upper_from; /* [n] */
   double *x_lower_factor, *x_upper_factor;
@@ -34,11 +34,12 @@ typedef struct presolver {
   double *certificate;
 } presolver;
 
-/* Sides that cross by less than this, relative to their size, are the same. Twice what certify.c puts down to rounding, so
- * that it accepts every proof that is given here. */
+/* Sides that cross by less than this, relative to their size, are the same. Twice what certify.c puts down to
+ * rounding, so that it accepts every proof that is given here. */
 static double crossing(size_t n) { return 2 * (1000 + 8 * (double)n) * DBL_EPSILON; }
 
-/* Unit rows that differ by less in every entry are parallel: entries, length and scale are each rounded once or twice. */
+/* Unit rows that differ by less in every entry are parallel: entries, length and scale are each rounded once or
+ * twice. */
 static const double SAME_ROW = 16 * DBL_EPSILON;
 
 /* ---- One row ---- */
@@ -98,7 +99,8 @@ static direction direction_of(const qp_matrix_row *row, const double *random) {
   return d;
 }
 
-/* A side in the units of the unit row: what overflows on the far side is none, on the near side the largest number. */
+/* A side in the units of the unit row: what overflows on the far side is none, on the near side the largest number.
+ */
 static double scaled_lower(double side, double scale) { return fmin(side * scale, DBL_MAX); }
 static double scaled_upper(double side, double scale) { return fmax(side * scale, -DBL_MAX); }
 
@@ -119,15 +121,15 @@ static void name_of(const presolver *s, size_t i, char *text, size_t size) {
     snprintf(text, size, "the bounds of x[%zu]", i - s->m);
 }
 
-static batten_status conflict(const presolver *s, size_t lower, double lower_factor, size_t upper, double upper_factor,
-                              double by) {
+static batten_status conflict(const presolver *s, size_t lower, double lower_factor, size_t upper,
+                              double upper_factor, double by) {
   char one[64], other[64];
   prove(s, lower, lower_factor);
   prove(s, upper, -upper_factor);
   name_of(s, lower, one, sizeof one);
   name_of(s, upper, other, sizeof other);
-  return batten_fail(s->ctx, BATTEN_E_INFEASIBLE, "%s and %s: the sides cross by %.3g of the unit row; relax one", one,
-                     other, by);
+  return batten_fail(s->ctx, BATTEN_E_INFEASIBLE, "%s and %s: the sides cross by %.3g of the unit row; relax one",
+                     one, other, by);
 }
 
 /* Sides that cross by rounding are made equal; beyond it, no x satisfies them. */
@@ -147,8 +149,8 @@ static batten_status zero_row(const presolver *s, size_t i) {
   double lower = lower_of(s->problem, i), upper = upper_of(s->problem, i);
   if (lower <= 0 && upper >= 0) return BATTEN_OK;
   prove(s, i, lower > 0 ? 1 : -1);
-  return batten_fail(s->ctx, BATTEN_E_INFEASIBLE, "row %zu of c: zeros, but sides [%g, %g]; remove or relax it", i, lower,
-                     upper);
+  return batten_fail(s->ctx, BATTEN_E_INFEASIBLE, "row %zu of c: zeros, but sides [%g, %g]; remove or relax it", i,
+                     lower, upper);
 }
 
 /* a x_j within its sides: x_j within theirs. */
@@ -228,8 +230,8 @@ static void append(presolver *s, size_t i, double scale, double lower, double up
   o->lower_factor[k] = lower_factor, o->upper_factor[k] = upper_factor;
 }
 
-/* Cells of the component are 2^-30 wide; within 2^-40 of a border, far beyond the component's rounding, the next cell is
- * searched, too. */
+/* Cells of the component are 2^-30 wide; within 2^-40 of a border, far beyond the component's rounding, the next cell
+ * is searched, too. */
 static void place_row(presolver *s, size_t i, const direction *d) {
   double cell = fabs(d->component) * 0x1p30, whole = floor(cell), part = cell - whole;
   uint64_t key = (uint64_t)whole;
@@ -424,8 +426,14 @@ batten_status qp_presolve_new(batten_context *ctx, const batten_qp_problem *prob
   st = drop_implied(&s);
   if (st < 0) goto done;
   append_bounds(&s);
-  out->rows = (qp_rows){.n = s.n, .m = s.kept, .c = problem->c, .row = out->row, .identity = out->identity,
-                        .scale = out->scale, .lower = out->lower, .upper = out->upper};
+  out->rows = (qp_rows){.n = s.n,
+                        .m = s.kept,
+                        .c = problem->c,
+                        .row = out->row,
+                        .identity = out->identity,
+                        .scale = out->scale,
+                        .lower = out->lower,
+                        .upper = out->upper};
 done:
   batten_free(ctx, s.key);
   batten_free(ctx, s.next);

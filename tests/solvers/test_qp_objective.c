@@ -1,5 +1,5 @@
-/* Objectives: R'R against P and target against gradient in long double; what is convex, singular, indefinite by 1e-10;
- * the sparse Hessian against the dense one; the same bits however columns are scaled by powers of two. */
+/* Objectives: R'R against P and target against gradient in long double; what is convex, singular, indefinite by
+ * 1e-10; the sparse Hessian against the dense one; the same bits however columns are scaled by powers of two. */
 #include "la/la.h"
 #include "qp/certify.h"
 #include "qp/objective.h"
@@ -51,12 +51,13 @@ static long double entry(const batten_qp_problem *p, size_t i, size_t j) {
   return sum;
 }
 
-/* Factor at rho: R'R against P + rho D^2 and R'(R x - target) against gradient + rho D^2 (x - center), relative to the
- * metric. */
+/* Factor at rho: R'R against P + rho D^2 and R'(R x - target) against gradient + rho D^2 (x - center), relative to
+ * the metric. */
 static void check_factor(batten_context *ctx, const batten_qp_problem *p, double rho, const char *what) {
   size_t n = p->n, index = 77;
   uint64_t seed = 5;
-  double *r = malloc((n * n + 1) * sizeof *r), *base = malloc((n + 1) * sizeof *base), *ray = malloc((n + 1) * sizeof *ray);
+  double *r = malloc((n * n + 1) * sizeof *r), *base = malloc((n + 1) * sizeof *base),
+         *ray = malloc((n + 1) * sizeof *ray);
   double *x = vector(n, &seed), *center = vector(n, &seed), *target = malloc((n + 1) * sizeof *target);
   double *gradient = malloc((n + 1) * sizeof *gradient);
   qp_objective o;
@@ -166,7 +167,8 @@ static void test_by_hand(batten_context *ctx) {
   qp_objective_free(ctx, &o);
 }
 
-/* Least squares of condition 1e10 with a known solution: by QR the error is that of A's condition, not of its square. */
+/* Least squares of condition 1e10 with a known solution: by QR the error is that of A's condition, not of its square.
+ */
 static void test_condition(batten_context *ctx) {
   enum { N = 20, K = 40 };
   uint64_t seed = 3;
@@ -175,7 +177,8 @@ static void test_condition(batten_context *ctx) {
   double *s = with_spectrum(K, eigenvalues, 0, &seed), *a = malloc(K * N * sizeof *a);
   for (size_t i = 0; i < K; i++) {
     long double sum = 0;
-    for (size_t j = 0; j < N; j++) sum += (long double)(a[i * N + j] = s[i * K + j] * (j < N / 2 ? 1 : 0x1p-30)) * solution[j];
+    for (size_t j = 0; j < N; j++)
+      sum += (long double)(a[i * N + j] = s[i * K + j] * (j < N / 2 ? 1 : 0x1p-30)) * solution[j];
     b[i] = (double)sum;
   }
   batten_matrix rows = batten_matrix_dense(K, N, a);
@@ -227,7 +230,8 @@ static void test_scaling(batten_context *ctx) {
 /* Status at rho of an H alone, and beside an A; the judge agrees. */
 static batten_status judge(batten_context *ctx, size_t n, const double *values, double rho, bool with_a) {
   batten_matrix h = batten_matrix_dense(n, n, values);
-  double *a = calloc(n * n + 1, sizeof *a), *r = malloc((n * n + 1) * sizeof *r), *base = malloc((n + 1) * sizeof *base);
+  double *a = calloc(n * n + 1, sizeof *a), *r = malloc((n * n + 1) * sizeof *r),
+         *base = malloc((n + 1) * sizeof *base);
   double *ray = calloc(n + 1, sizeof *ray);
   for (size_t i = 0; i < n; i++) a[i * n + i] = 1;
   batten_matrix rows = batten_matrix_dense(n, n, a);
@@ -269,9 +273,11 @@ static void test_indefinite(batten_context *ctx) {
         free(h);
         eigenvalues[n - 1 - n / 3] = 0;
         h = with_spectrum(n, eigenvalues, spread, &seed);
-        alone = judge(ctx, n, h, 0, false), shifted = judge(ctx, n, h, 1e-6, false), beside = judge(ctx, n, h, 0, true);
+        alone = judge(ctx, n, h, 0, false), shifted = judge(ctx, n, h, 1e-6, false),
+        beside = judge(ctx, n, h, 0, true);
         /* rounding may leave it definite, of condition 1e13 or more */
-        all = (alone == BATTEN_E_SINGULAR || (n < 10 && alone == BATTEN_OK)) && shifted == BATTEN_OK && beside == BATTEN_OK;
+        all = (alone == BATTEN_E_SINGULAR || (n < 10 && alone == BATTEN_OK)) && shifted == BATTEN_OK &&
+              beside == BATTEN_OK;
         if (!all) printf("# n %zu, 0 for %g, kind %zu: %d %d %d\n", n, by[e], kind, alone, shifted, beside);
         wrong += !all;
         free(h), free(eigenvalues);
@@ -290,11 +296,16 @@ static void test_small_indefinite(batten_context *ctx) {
     const char *what;
     const double *h;
     bool convex;
-  } cases[] = {{"zero diagonal", zero_diagonal, false}, {"half a zero diagonal", half, false},
-               {"negative entry", negative, false},     {"minor", minor, false},
-               {"a minor by an ulp", ulp, true},        {"rounding beside a zero", noise, true},
-               {"zeros", zeros, true},                  {"subnormal entry", tiny, true},
-               {"all negative", all_negative, false},   {"negative rounding", noisy_negative, true},
+  } cases[] = {{"zero diagonal", zero_diagonal, false},
+               {"half a zero diagonal", half, false},
+               {"negative entry", negative, false},
+               {"minor", minor, false},
+               {"a minor by an ulp", ulp, true},
+               {"rounding beside a zero", noise, true},
+               {"zeros", zeros, true},
+               {"subnormal entry", tiny, true},
+               {"all negative", all_negative, false},
+               {"negative rounding", noisy_negative, true},
                {"sizes apart by 1e600", far, true}};
   for (size_t q = 0; q < sizeof cases / sizeof *cases; q++) {
     batten_status st = judge(ctx, 2, cases[q].h, 0x1p-10, false), beside = judge(ctx, 2, cases[q].h, 0, true);
@@ -332,7 +343,8 @@ static void test_sparse(batten_context *ctx, size_t n, size_t k, bool dense_a, u
     }
     starts[i + 1] = entries;
   }
-  for (size_t j = 0; j + 1 < n; j += 2) h[j * n + j] = 2, h[j * n + j + 1] = h[(j + 1) * n + j] = 1, h[(j + 1) * n + j + 1] = 1;
+  for (size_t j = 0; j + 1 < n; j += 2)
+    h[j * n + j] = 2, h[j * n + j + 1] = h[(j + 1) * n + j] = 1, h[(j + 1) * n + j + 1] = 1;
   batten_matrix rows = dense_a ? batten_matrix_dense(k, n, a) : batten_matrix_sparse(k, n, starts, indices, values);
   batten_matrix plain = batten_matrix_dense(k, n, a), tension = batten_matrix_dense(n, n, h), hessian;
   batten_qp_problem p = {.struct_size = sizeof p, .n = n, .a = &rows, .b = b, .weights = w, .g = g, .h = &tension};
@@ -343,7 +355,8 @@ static void test_sparse(batten_context *ctx, size_t n, size_t k, bool dense_a, u
   void *memory = NULL;
   T_OK(qp_objective_new(ctx, &p, &o), ctx);
   T_OK(qp_objective_sparse(ctx, &o, &s, &hessian, &memory), ctx);
-  double *full = calloc(n * n + 1, sizeof *full), *zero = calloc(n + 1, sizeof *zero), *q = malloc((n + 1) * sizeof *q);
+  double *full = calloc(n * n + 1, sizeof *full), *zero = calloc(n + 1, sizeof *zero),
+         *q = malloc((n + 1) * sizeof *q);
   bool sorted = s.h == &hessian && s.n == n;
   size_t diagonals = 0;
   for (size_t i = 0; i < n; i++)
@@ -368,7 +381,8 @@ static void test_sparse(batten_context *ctx, size_t n, size_t k, bool dense_a, u
   T_RATIO(worst, 1e-13, "q is the gradient at 0");
   batten_free(ctx, memory);
   qp_objective_free(ctx, &o);
-  free(q), free(zero), free(full), free(indices), free(starts), free(values), free(h), free(g), free(w), free(b), free(a);
+  free(q), free(zero), free(full), free(indices), free(starts), free(values), free(h), free(g), free(w), free(b),
+      free(a);
 }
 
 /* 1e5 unknowns: nothing [n][n]. */
@@ -387,8 +401,9 @@ static void test_large(batten_context *ctx) {
   T_OK(qp_objective_new(ctx, &p, &o), ctx);
   T_OK(qp_objective_sparse(ctx, &o, &s, &h, &memory), ctx);
   size_t middle = h.starts[n / 2];
-  T_CHECK(h.starts[n] == 5 * n - 6 && h.values[middle] == 1 && h.values[middle + 1] == -4 && h.values[middle + 2] == 6,
-          "second differences of %zu unknowns: 1 -4 6 -4 1, in %.3g ms", n, 1e3 * (batten_now() - before));
+  T_CHECK(
+      h.starts[n] == 5 * n - 6 && h.values[middle] == 1 && h.values[middle + 1] == -4 && h.values[middle + 2] == 6,
+      "second differences of %zu unknowns: 1 -4 6 -4 1, in %.3g ms", n, 1e3 * (batten_now() - before));
   batten_free(ctx, memory);
   qp_objective_free(ctx, &o);
   free(values), free(indices), free(starts);

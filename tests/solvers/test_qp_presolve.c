@@ -8,13 +8,13 @@ static double uniform(uint64_t *seed) { return 2 * t_uniform(seed) - 1; }
 
 /* 3 unknowns; every kind of row once. */
 static void test_by_hand(batten_context *ctx) {
-  static const double c[] = {3, 4, 0,   /* 0: length 5 */
-                             0, 0, 0,   /* 1: zeros that hold */
-                             -6, -8, 0, /* 2: antiparallel to 0, tighter above: -6x - 8y >= -20 is 3x + 4y <= 10 */
-                             0, -2, 0,  /* 3: a bound: -2y <= 2 is y >= -1 */
-                             1, 1, 1,   /* 4: no sides */
-                             1, 0, 2,   /* 5: implied by the bounds above */
-                             0, 4, 0};  /* 6: a bound that is not the tightest */
+  static const double c[] = {3,  4,  0,  /* 0: length 5 */
+                             0,  0,  0,  /* 1: zeros that hold */
+                             -6, -8, 0,  /* 2: antiparallel to 0, tighter above: -6x - 8y >= -20 is 3x + 4y <= 10 */
+                             0,  -2, 0,  /* 3: a bound: -2y <= 2 is y >= -1 */
+                             1,  1,  1,  /* 4: no sides */
+                             1,  0,  2,  /* 5: implied by the bounds above */
+                             0,  4,  0}; /* 6: a bound that is not the tightest */
   static const double lower[] = {-5, -1, -20, -INFINITY, -INFINITY, -INFINITY, -8};
   static const double upper[] = {INFINITY, 1, INFINITY, 2, INFINITY, 7.5, 4};
   static const double x_lower[] = {-INFINITY, -3, 1}, x_upper[] = {5, 7, 1};
@@ -48,7 +48,8 @@ static void test_by_hand(batten_context *ctx) {
       of_core = core[q][0] * 0.2 * c[j];
       for (size_t k = 0; k < 3; k++) of_core += core[q][1 + k] * bound[k][j];
       for (size_t i = 0; i < 7; i++) of_caller += y[i] * c[3 * i + j];
-      if (q != 2) worst = fmax(worst, fabs(of_core - of_caller)); /* 2: x has no lower bound, its multiplier is dropped */
+      if (q != 2)
+        worst = fmax(worst, fabs(of_core - of_caller)); /* 2: x has no lower bound, its multiplier is dropped */
     }
     T_RATIO(worst, 1e-15, "the same gradient");
     qp_presolve_forward(&s, active, again);
@@ -82,16 +83,16 @@ static void refuse(batten_context *ctx, const char *text, size_t m, size_t n, co
 
 static void test_infeasible(batten_context *ctx) {
   const double inf = INFINITY;
-  refuse(ctx, "row 1 of c: zeros, but sides [0.5", 2, 2, (double[]){1, 1, 0, 0}, (double[]){0, 0.5}, (double[]){inf, inf},
+  refuse(ctx, "row 1 of c: zeros, but sides [0.5", 2, 2, (double[]){1, 1, 0, 0}, (double[]){0, 0.5},
+         (double[]){inf, inf}, NULL, NULL);
+  refuse(ctx, "row 0 of c: zeros, but sides [-inf, -1]", 1, 2, (double[]){0, 0}, (double[]){-inf}, (double[]){-1},
          NULL, NULL);
-  refuse(ctx, "row 0 of c: zeros, but sides [-inf, -1]", 1, 2, (double[]){0, 0}, (double[]){-inf}, (double[]){-1}, NULL,
-         NULL);
   refuse(ctx, "row 0 of c and row 1 of c: the sides cross", 2, 2, (double[]){1, 2, -2, -4}, (double[]){1, -1},
          (double[]){inf, inf}, NULL, NULL);
   refuse(ctx, "the bounds of x[1] and row 0 of c", 1, 2, (double[]){0, 3}, (double[]){-inf}, (double[]){5},
          (double[]){-inf, 2}, (double[]){inf, inf});
-  refuse(ctx, "row 1 of c and row 0 of c", 2, 1, (double[]){-1, 1e150}, (double[]){1, 1e151}, (double[]){inf, inf}, NULL,
-         NULL);
+  refuse(ctx, "row 1 of c and row 0 of c", 2, 1, (double[]){-1, 1e150}, (double[]){1, 1e151}, (double[]){inf, inf},
+         NULL, NULL);
   refuse(ctx, "row 0 of c: within the bounds of x it is in [-3, 3]", 1, 2, (double[]){1, -2}, (double[]){4},
          (double[]){inf}, (double[]){-1, -1}, (double[]){1, 1});
   refuse(ctx, "row 0 of c: within the bounds of x it is in [-3, 3]", 1, 2, (double[]){1, -2}, (double[]){-inf},
@@ -110,7 +111,8 @@ static void test_rounding(batten_context *ctx) {
   p.c = &rows, p.lower = lower, p.upper = upper, p.x_lower = x_lower, p.x_upper = x_upper;
   qp_presolve s;
   T_OK(qp_presolve_new(ctx, &p, &s, NULL), ctx);
-  T_CHECK(s.rows.m == 3 && qp_rows_is_equality(&s.rows, 0) && qp_rows_is_equality(&s.rows, 1), "sides are made equal");
+  T_CHECK(s.rows.m == 3 && qp_rows_is_equality(&s.rows, 0) && qp_rows_is_equality(&s.rows, 1),
+          "sides are made equal");
   double y[3] = {1, -1, 0}, back[5];
   signed char active[3] = {2, 2, 0}, caller[5], again[3];
   qp_presolve_back(&s, y, active, back, caller);
@@ -120,10 +122,11 @@ static void test_rounding(batten_context *ctx) {
   qp_presolve_free(ctx, &s);
 }
 
-/* Rows scaled by powers from 1e-150 to 1e150, turned round and repeated among m: as many constraints as there were rows
- * to start from, with the same unit sides. */
+/* Rows scaled by powers from 1e-150 to 1e150, turned round and repeated among m: as many constraints as there were
+ * rows to start from, with the same unit sides. */
 static void test_many(batten_context *ctx, size_t m, size_t originals, size_t n, bool sparse, uint64_t seed) {
-  double *base = malloc(originals * n * sizeof *base), *c = malloc(m * n * sizeof *c), *lower = malloc(m * sizeof *lower);
+  double *base = malloc(originals * n * sizeof *base), *c = malloc(m * n * sizeof *c),
+         *lower = malloc(m * sizeof *lower);
   double *upper = malloc(m * sizeof *upper), *tightest = malloc(originals * 2 * sizeof *tightest);
   size_t *starts = malloc((m + 1) * sizeof *starts), *of = malloc(m * sizeof *of), entries = 0;
   uint32_t *indices = malloc(m * n * sizeof *indices);
@@ -172,7 +175,8 @@ static void test_many(batten_context *ctx, size_t m, size_t originals, size_t n,
   T_RATIO(worst, 1e-14, "their sides");
   T_RATIO(length, 1e-14, "their lengths less 1");
   qp_presolve_free(ctx, &s);
-  free(x), free(values), free(indices), free(of), free(starts), free(tightest), free(upper), free(lower), free(c), free(base);
+  free(x), free(values), free(indices), free(of), free(starts), free(tightest), free(upper), free(lower), free(c),
+      free(base);
 }
 
 /* Subnormal and nearly overflowing rows. */
