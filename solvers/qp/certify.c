@@ -387,20 +387,22 @@ bool qp_certify_unbounded(const batten_qp_problem *problem, double *d, double *w
  */
 bool qp_certify_not_convex(const batten_qp_problem *problem, const double *d) {
   const batten_qp_problem *p = problem;
-  const double FAR = 1e-6, OTHERS = (64 + (double)p->n) * DBL_EPSILON;
+  const double FAR = 1e-6;
   if (!p->h) return false;
-  double most = 0, hidden = 0;
+  double most = 0, hidden = 0, longest = 0;
   for (size_t i = 0; i < p->n; i++) {
     line l = line_of(p->h, i);
+    longest = fmax(longest, (double)l.count);
     for (size_t e = 0; e < l.count; e++) most = larger(fabs(l.values[e]), most);
   }
+  const double OWN = (1000 + 8 * longest) * DBL_EPSILON, OTHERS = (64 + longest) * DBL_EPSILON;
   exact energy = {0, 0};
   for (size_t i = 0; i < p->n; i++) {
     line l = line_of(p->h, i);
     double own = 0;
     for (size_t e = 0; e < l.count; e++)
       if (column_of(&l, e) == i) own = fabs(l.values[e]);
-    hidden += fmin(fmax(rounding(p) * own, OTHERS * most), FAR * own) * d[i] * d[i];
+    hidden += fmin(fmax(OWN * own, OTHERS * most), FAR * own) * d[i] * d[i];
     if (d[i] != 0) energy = plus_multiple(energy, d[i], dot(p->h, i, d));
   }
   /* a quarter: whoever proposes d may measure it by scales that are powers of two */

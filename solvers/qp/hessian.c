@@ -11,6 +11,7 @@
 #include <string.h>
 
 #include "base/checked.h"
+#include "kkt.h"
 #include "la/la.h"
 #include "matrix_row.h"
 #include "objective.h"
@@ -72,11 +73,21 @@ static void scaled_matrix(const batten_matrix *h, const double *scale, double *s
 
 /* ---- Convexity ---- */
 
+/* Entries of the longest row. */
+static size_t longest_row(const batten_matrix *h) {
+  size_t longest = 0;
+  for (size_t i = 0; i < h->rows; i++) {
+    qp_matrix_row row = qp_row_of(h, i);
+    if (row.count > longest) longest = row.count;
+  }
+  return longest;
+}
+
 /* N_jj: what is put down to rounding of H's entries. They may be sums of some thousand products, or computed with
  * errors relative to the largest of them; but what is far below 0 in scaled unknowns is believed in whatever units
  * they are. */
-static double noise_of(size_t n, double largest, double scale) {
-  const double OWN = (1000 + 8 * (double)n) * DBL_EPSILON, OTHERS = (64 + (double)n) * DBL_EPSILON, FAR = 1e-6;
+static double noise_of(size_t row, double largest, double scale) {
+  const double OWN = (1000 + 8 * (double)row) * DBL_EPSILON, OTHERS = (64 + (double)row) * DBL_EPSILON, FAR = 1e-6;
   return fmin(fmax(OWN, OTHERS * (largest / scale / scale)), FAR);
 }
 
@@ -98,7 +109,7 @@ static void set_ray(size_t n, const double *scale, const double *v, double *ray)
 }
 
 batten_status qp_hessian_convex(batten_context *ctx, const batten_matrix *h, size_t *index, double *ray) {
-  size_t n = h->rows;
+  size_t n = h->rows, longest = longest_row(h);
   if (!batten_la_fits(n)) return batten_fail(ctx, BATTEN_E_TOO_LARGE, "h: %zu rows; use the interior engine", n);
   batten_status st = BATTEN_E_NOMEM;
   double *scale = NULL, *s = batten_alloc_array(ctx, n, n * sizeof *s);
@@ -107,7 +118,7 @@ batten_status qp_hessian_convex(batten_context *ctx, const batten_matrix *h, siz
   if (!scale) goto done;
   double *v = scale + n, largest = set_scales(h, v, scale);
   scaled_matrix(h, scale, s);
-  for (size_t j = 0; j < n; j++) s[j + j * n] += scale[j] > 0 ? noise_of(n, largest, scale[j]) : 1;
+  for (size_t j = 0; j < n; j++) s[j + j * n] += scale[j] > 0 ? noise_of(longest, largest, scale[j]) : 1;
   /* the lower triangle is left as it was: row j of it is s_j */
   size_t broken = batten_la_potrf(D, 'U', n, s, n);
   st = BATTEN_OK;
@@ -132,7 +143,7 @@ done:
 
 /* A minor of rows i and j is negative along (1, t) where that is least, or with t of size one if other is none. */
 batten_status qp_hessian_minors(batten_context *ctx, const batten_matrix *h, size_t *index, double *ray) {
-  size_t n = h->rows;
+  size_t n = h->rows, longest = longest_row(h);
   double *scale = batten_alloc_array(ctx, n, 2 * sizeof *scale);
   if (!scale) return BATTEN_E_NOMEM;
   batten_status st = BATTEN_OK;
@@ -140,11 +151,11 @@ batten_status qp_hessian_minors(batten_context *ctx, const batten_matrix *h, siz
   for (size_t i = 0; i < n && st >= 0; i++) {
     qp_matrix_row row = qp_row_of(h, i);
     if (scale[i] <= 0) continue;
-    double own = diagonal[i] / scale[i] / scale[i] + noise_of(n, largest, scale[i]);
+    double own = diagonal[i] / scale[i] / scale[i] + noise_of(longest, largest, scale[i]);
     for (size_t e = 0; e < row.count && st >= 0; e++) {
       size_t j = qp_row_column(&row, e);
       if (scale[j] <= 0) continue;
-      double other = diagonal[j] / scale[j] / scale[j] + noise_of(n, largest, scale[j]);
+      double other = diagonal[j] / scale[j] / scale[j] + noise_of(longest, largest, scale[j]);
       double off = row.values[e] / scale[i] / scale[j];
       double t = i == j ? 0 : other > 0 ? -off / other : copysign(1, -off);
       double least = i == j ? own : own + 2 * t * off + t * t * other;
@@ -157,6 +168,90 @@ batten_status qp_hessian_minors(batten_context *ctx, const batten_matrix *h, siz
       st = not_convex(ctx, i, least / (1 + t * t));
     }
   }
+  batten_free(ctx, scale);
+  return st;
+}
+
+/* ---- Convexity of sparse matrices ---- */
+
+/* S + N for the sparse factorization, and which of its leading minors are definite. */
+typedef struct leading {
+  size_t n;
+  double *values; /* of S, as the entries of H are ordered */
+  double *noise;  /* [n] N */
+  double *shift;  /* [n] what the factorization adds to the diagonal */
+  double *v;      /* [n] */
+  qp_ldl *ldl;
+} leading;
+
+/* Whether the first `count` unknowns, those after being cut off by a huge diagonal, have only positive pivots. */
+static bool definite(leading *l, size_t count) {
+  const double CUT_OFF = 1e40; /* entries of S are near 1 at most where it is semidefinite */
+  for (size_t j = 0; j < l->n; j++) l->shift[j] = j < count ? l->noise[j] : CUT_OFF;
+  return qp_ldl_factor(l->ldl, l->shift, NULL) == 0;
+}
+
+/* v := [-(S + N)_j^-1 s_j; 1; 0] for the first unknown j whose minor is not definite. */
+static size_t descend(leading *l, const batten_matrix *h) {
+  size_t low = 0, high = l->n;
+  while (high - low > 1) {
+    size_t middle = low + (high - low) / 2;
+    if (definite(l, middle))
+      low = middle;
+    else
+      high = middle;
+  }
+  memset(l->v, 0, l->n * sizeof *l->v);
+  definite(l, low);
+  for (size_t e = h->starts[low]; e < h->starts[low + 1]; e++)
+    if (h->indices[e] < low) l->v[h->indices[e]] = -l->values[e];
+  qp_ldl_solve(l->ldl, l->v, NULL);
+  for (size_t j = low; j < l->n; j++) l->v[j] = j == low;
+  return low;
+}
+
+static bool is_diagonal(const batten_matrix *h) {
+  for (size_t i = 0; i < h->rows; i++)
+    for (size_t e = h->starts[i]; e < h->starts[i + 1]; e++)
+      if (h->indices[e] != i) return false;
+  return true;
+}
+
+batten_status qp_hessian_convex_sparse(batten_context *ctx, const batten_matrix *h, size_t *index, double *ray) {
+  /* Below so many unknowns a dense factor is as cheap; beyond so many operations only minors are looked at. */
+  const size_t FEW = 64;
+  const double TOO_MUCH = 1e11;
+  size_t n = h->rows, longest = longest_row(h), none[1] = {0};
+  if (h->dense || n <= FEW) return qp_hessian_convex(ctx, h, index, ray);
+  batten_status st = qp_hessian_minors(ctx, h, index, ray);
+  if (st < 0 || is_diagonal(h)) return st;
+  leading l = {.n = n};
+  st = BATTEN_E_NOMEM;
+  double *scale = batten_alloc_array(ctx, n, 4 * sizeof *scale);
+  if (!scale) goto done;
+  l.values = batten_alloc_array(ctx, h->starts[n], sizeof *l.values);
+  if (!l.values) goto done;
+  l.noise = scale + n, l.shift = scale + 2 * n, l.v = scale + 3 * n;
+  double largest = set_scales(h, l.v, scale);
+  for (size_t i = 0; i < n; i++) {
+    l.noise[i] = scale[i] > 0 ? noise_of(longest, largest, scale[i]) : 1;
+    for (size_t e = h->starts[i]; e < h->starts[i + 1]; e++) {
+      double other = scale[h->indices[e]];
+      l.values[e] = scale[i] > 0 && other > 0 ? h->values[e] / scale[i] / other : 0;
+    }
+  }
+  qp_csr scaled = {n, n, h->starts, h->indices, l.values}, rows = {0, n, none, NULL, NULL};
+  st = qp_ldl_new(ctx, &scaled, &rows, &l.ldl);
+  if (st < 0) goto done;
+  if (qp_ldl_flops(l.ldl) > TOO_MUCH || definite(&l, n)) goto done;
+  size_t j = descend(&l, h);
+  set_ray(n, scale, l.v, ray);
+  *index = j;
+  st = batten_fail(ctx, BATTEN_E_NOT_CONVEX,
+                   "h: its minor of the unknowns up to %zu is negative; make it positive semidefinite", j);
+done:
+  qp_ldl_free(ctx, l.ldl);
+  batten_free(ctx, l.values);
   batten_free(ctx, scale);
   return st;
 }

@@ -368,6 +368,9 @@ void qp_objective_target(const qp_objective *o, double rho, const double *r, con
   for (size_t j = 0; j < n; j++) target[j] += base[j];
 }
 
-batten_status qp_objective_minors(batten_context *ctx, const qp_objective *o, size_t *index, double *ray) {
-  return o->state->convex ? BATTEN_OK : qp_hessian_minors(ctx, o->problem->h, index, ray);
+batten_status qp_objective_convex(batten_context *ctx, const qp_objective *o, size_t *index, double *ray) {
+  if (o->state->convex) return BATTEN_OK;
+  batten_status st = qp_hessian_convex_sparse(ctx, o->problem->h, index, ray);
+  if (st >= 0) o->state->convex = true;
+  return st;
 }

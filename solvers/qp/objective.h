@@ -35,15 +35,19 @@ void qp_objective_target(const qp_objective *o, double rho, const double *r, con
  * its diagonal entry, and P is symmetric to the last bit where H is. */
 batten_status qp_objective_sparse(batten_context *ctx, const qp_objective *o, qp_sparse *out, batten_matrix *h,
                                   void **memory);
-/* What the sparse route can tell about H without factoring it: E_NOT_CONVEX, *index, ray [n], when a diagonal entry or a
- * minor of two rows is negative beyond rounding. Time O(entries). */
-batten_status qp_objective_minors(batten_context *ctx, const qp_objective *o, size_t *index, double *ray);
+/* Whether H is semidefinite, for engines that do without factors: E_NOT_CONVEX, *index, ray [n] as of factor. By a sparse
+ * factor of H where H is sparse. */
+batten_status qp_objective_convex(batten_context *ctx, const qp_objective *o, size_t *index, double *ray);
+static inline batten_status qp_objective_minors(batten_context *ctx, const qp_objective *o, size_t *index, double *ray) {
+  return qp_objective_convex(ctx, o, index, ray);
+}
 
 /* ---- hessian.c: a symmetric matrix alone ---- */
 
-/* E_NOT_CONVEX, *index, ray [n] as above, when H is not semidefinite up to rounding: some n^3/3 flops and n^2 doubles; and
- * what can be told from the minors of two rows. */
+/* E_NOT_CONVEX, *index, ray [n] as above, when H is not semidefinite up to rounding: by a dense factor, some n^3/3 flops and
+ * n^2 doubles; by a sparse one; by the minors of two rows alone, in O(entries). */
 batten_status qp_hessian_convex(batten_context *ctx, const batten_matrix *h, size_t *index, double *ray);
+batten_status qp_hessian_convex_sparse(batten_context *ctx, const batten_matrix *h, size_t *index, double *ray);
 batten_status qp_hessian_minors(batten_context *ctx, const batten_matrix *h, size_t *index, double *ray);
 /* u [n][n] column-major, its first *rank rows: U'U = H up to rounding, entries of column j being those of unknown j. H is
  * semidefinite. */

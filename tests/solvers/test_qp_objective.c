@@ -318,11 +318,54 @@ static void test_small_indefinite(batten_context *ctx) {
     size_t index = 2;
     double ray[2];
     T_OK(qp_objective_new(ctx, &p, &o), ctx);
-    st = qp_objective_minors(ctx, &o, &index, ray);
+    st = qp_hessian_minors(ctx, &h, &index, ray);
     T_CHECK(st == expected && (st == BATTEN_OK || (index < 2 && qp_certify_not_convex(&p, ray))), "by minors: %s",
             st ? batten_error(ctx) : "convex");
     qp_objective_free(ctx, &o);
   }
+}
+
+/* Banded H, sparse, n unknowns in shuffled order: L D L' of bidiagonal L with one pivot `by` among pivots of 1, so
+ * that no minor of two rows tells. Columns times powers of two. */
+static void test_sparse_indefinite(batten_context *ctx, size_t n, double by, uint64_t seed) {
+  size_t *starts = malloc((n + 1) * sizeof *starts), *place = malloc(n * sizeof *place), entries = 0, odd = n / 3;
+  uint32_t *indices = malloc(3 * n * sizeof *indices);
+  double *values = malloc(3 * n * sizeof *values), *ray = malloc(n * sizeof *ray);
+  for (size_t i = 0; i < n; i++) place[i] = i;
+  for (size_t i = n; i-- > 1;) {
+    size_t j = t_random(&seed) % (i + 1), k = place[i];
+    place[i] = place[j], place[j] = k;
+  }
+  size_t *node = malloc(n * sizeof *node);
+  for (size_t i = 0; i < n; i++) node[place[i]] = i;
+  for (size_t i = 0; i < n; i++) {
+    size_t q = node[i];
+    starts[i] = entries;
+    for (size_t r = q > 0 ? q - 1 : 0; r < n && r <= q + 1; r++) {
+      double low = r < q ? (double)(r % 5) / 4 : (double)(q % 5) / 4, pivot = q == odd ? by : 1,
+             before = q == odd + 1 ? by : 1;
+      double l_before = q > 0 ? (double)((q - 1) % 5) / 4 : 0;
+      if (r == q)
+        values[entries] = pivot + l_before * l_before * (q > 0 ? before : 0);
+      else
+        values[entries] = low * ((r < q ? r : q) == odd ? by : 1);
+      values[entries] = ldexp(values[entries], (int)(q % 7) + (int)(r % 7));
+      indices[entries++] = (uint32_t)place[r];
+    }
+  }
+  starts[n] = entries;
+  batten_matrix h = batten_matrix_sparse(n, n, starts, indices, values);
+  batten_qp_problem p = {.struct_size = sizeof p, .n = n, .h = &h};
+  qp_objective o;
+  size_t index = n;
+  double before = batten_now();
+  T_OK(qp_objective_new(ctx, &p, &o), ctx);
+  batten_status st = qp_objective_convex(ctx, &o, &index, ray);
+  T_CHECK(st == (by < 0 ? BATTEN_E_NOT_CONVEX : BATTEN_OK), "n = %zu, pivot %g: %s, %.2g ms", n, by,
+          st ? batten_error(ctx) : "convex", 1e3 * (batten_now() - before));
+  if (by < 0) T_CHECK(index < n && ray[index] != 0 && qp_certify_not_convex(&p, ray), "the judge agrees");
+  qp_objective_free(ctx, &o);
+  free(node), free(ray), free(values), free(indices), free(place), free(starts);
 }
 
 /* ---- Sparse ---- */
@@ -420,7 +463,7 @@ static batten_status with_memory(batten_context *ctx, void *arg) {
   if (st < 0) return st;
   st = qp_objective_factor(ctx, &o, 0, r, base, &index, ray);
   if (st >= 0) st = qp_objective_factor(ctx, &o, 1e-3, r, base, &index, ray);
-  if (st >= 0) st = qp_objective_minors(ctx, &o, &index, ray);
+  if (st >= 0) st = qp_objective_convex(ctx, &o, &index, ray);
   void *memory = NULL;
   qp_sparse s;
   batten_matrix h;
@@ -449,6 +492,12 @@ int main(void) {
   test_scaling(ctx);
   test_indefinite(ctx);
   test_small_indefinite(ctx);
+  for (size_t n = 70; n < 1e5; n *= 30) {
+    test_sparse_indefinite(ctx, n, 1e-3, n);
+    test_sparse_indefinite(ctx, n, 0, n);
+    test_sparse_indefinite(ctx, n, -1e-8, n);
+    test_sparse_indefinite(ctx, n, -1, n);
+  }
   test_sparse(ctx, 1, 1, false, 1);
   test_sparse(ctx, 12, 9, false, 2);
   test_sparse(ctx, 60, 300, false, 3);
