@@ -213,10 +213,8 @@ static batten_status try_composite(qp_search *s) {
     qp_search_direction(s);
     if (!composite_search(s)) continue;
     qp_search_multipliers(s);
-    size_t wrong = qp_search_wrong(s);
-    if (wrong < s->set.q) {
-      if (s->drops++ > QP_PATIENCE) break;
-      qp_search_drop(s, wrong);
+    if (qp_search_wrong(s) < s->set.q) {
+      if (!qp_search_resolve(s)) break;
     } else {
       if (++weights == WEIGHTS) break;
       s->weight *= HEAVIER;
@@ -244,12 +242,7 @@ static batten_status simplex(qp_search *s) {
     qp_search_direction(s);
     if (qp_phase1_falls(s) && search_along(s)) continue;
     qp_search_multipliers(s);
-    size_t wrong = qp_search_wrong(s);
-    if (wrong < s->set.q && s->drops++ < QP_PATIENCE) {
-      qp_search_drop(s, wrong);
-      continue;
-    }
-    if (wrong < s->set.q && qp_search_resolve(s) && search_along(s)) continue;
+    if (qp_search_wrong(s) < s->set.q && qp_search_resolve(s) && search_along(s)) continue;
     double violated = s->f_size;
     if (rest_is_rounding(s)) return BATTEN_OK;
     if (!gradient(s)) return BATTEN_OK;
@@ -261,13 +254,13 @@ static batten_status simplex(qp_search *s) {
 }
 
 batten_status qp_phase1(qp_search *s) {
-  s->drops = 0;
+  s->stuck = 0;
   qp_search_refresh(s);
   if (!gradient(s)) return BATTEN_OK;
   batten_status st = try_composite(s);
   if (st == BATTEN_OK) {
     qp_search_return(s);
-    s->drops = 0;
+    s->stuck = 0;
     st = simplex(s);
   }
   s->weight = 0;

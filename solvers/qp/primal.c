@@ -10,8 +10,9 @@
  * Most of very many rows are far from all iterates. The method runs on the rows in sight; a survey of all rows then
  * takes the safe point, which is feasible in all of them, as far as it can go towards the minimiser found, and brings
  * into sight the row that stops it and the most violated ones of each stretch of rows. The objective at the safe
- * point never rises, and it is what a limit or cancel leaves. Each survey but the last brings a row into sight, so
- * there are finitely many. */
+ * point never rises, and it is what a limit or cancel leaves. Once there is one, dual steps lead from the minimiser
+ * to that with the new rows, as on the second level of search.c; where rounding spoils them the method itself goes on
+ * from the safe point. Each survey but the last brings a row into sight, so there are finitely many. */
 #include "primal.h"
 
 #include <float.h>
@@ -38,17 +39,16 @@ static double reach_of_row(const qp_search *s, size_t place, double slack) {
 
 /* The row that stops x along p before 1, and where; sighted if none. Of those that stop it within rounding of the
  * first the steepest is taken [Harris 1973]: it makes the best member. */
-static size_t stopping_row(const qp_search *s, size_t exempt, double *alpha) {
+static size_t stopping_row(const qp_search *s, double *alpha) {
   double length = 0, first = 1;
   for (size_t j = 0; j < s->n; j++) length += s->p[j] * s->p[j];
   double level = 4 * (double)s->n * DBL_EPSILON * sqrt(length), steepest = 0;
   for (size_t i = 0; i < s->sighted; i++)
-    if (!(s->is[s->sight[i]] & (QP_MEMBER | QP_SKIPPED)) && fabs(s->slope[i]) > level && s->sight[i] != exempt)
+    if (!(s->is[s->sight[i]] & (QP_MEMBER | QP_SKIPPED)) && fabs(s->slope[i]) > level)
       first = fmin(first, reach_of_row(s, i, 1));
   size_t stops = s->sighted;
   for (size_t i = 0; i < s->sighted && first < 1; i++) {
-    if (s->is[s->sight[i]] & (QP_MEMBER | QP_SKIPPED) || fabs(s->slope[i]) <= level || s->sight[i] == exempt)
-      continue;
+    if (s->is[s->sight[i]] & (QP_MEMBER | QP_SKIPPED) || fabs(s->slope[i]) <= level) continue;
     if (fabs(s->slope[i]) <= steepest || reach_of_row(s, i, 0) > first) continue;
     steepest = fabs(s->slope[i]);
     stops = i;
@@ -61,12 +61,12 @@ static size_t stopping_row(const qp_search *s, size_t exempt, double *alpha) {
 
 /* Goes along p until a row stops x, which becomes a member (false), or to the minimiser (true). Rows that stop x but
  * depend on the members do so by rounding and are passed. */
-static bool advance(qp_search *s, size_t exempt) {
+static bool advance(qp_search *s) {
   double alpha;
   size_t stops;
   bool more = false;
   qp_search_slopes(s);
-  while ((stops = stopping_row(s, exempt, &alpha)) < s->sighted) {
+  while ((stops = stopping_row(s, &alpha)) < s->sighted) {
     if (qp_search_add(s, stops, s->slope[stops] < 0 ? QP_LOWER : QP_UPPER)) break;
     s->is[s->sight[stops]] |= QP_SKIPPED;
     more = true;
@@ -87,8 +87,8 @@ static bool advance(qp_search *s, size_t exempt) {
 static batten_status descend(qp_search *s) {
   const size_t REFRESH = 100;
   const size_t ENOUGH = 1000 + 50 * (s->n + s->m);
-  size_t exempt = SIZE_MAX, pivots = 0, resolved = 0;
-  s->drops = 0;
+  size_t pivots = 0;
+  s->stuck = 0;
   qp_search_refresh(s);
   for (;;) {
     batten_status st = qp_search_pivot(s);
@@ -97,18 +97,9 @@ static batten_status descend(qp_search *s) {
       return batten_fail(s->ctx, BATTEN_W_ACCURACY, "rounding: no minimum after %zu pivots", pivots);
     if (s->since > REFRESH) qp_search_refresh(s);
     qp_search_direction(s);
-    bool arrived = advance(s, exempt);
-    exempt = SIZE_MAX;
-    if (!arrived) continue;
+    if (!advance(s)) continue;
     qp_search_multipliers(s);
-    size_t wrong = qp_search_wrong(s);
-    if (wrong == s->set.q) return BATTEN_OK;
-    if (s->drops == 0) resolved = 0;
-    if (s->drops++ < QP_PATIENCE) {
-      exempt = s->set.member[wrong];
-      qp_search_drop(s, wrong);
-    } else if (!qp_search_resolve(s) || resolved++ > 0)
-      return BATTEN_OK; /* a second time at the same point: what is left is rounding */
+    if (qp_search_wrong(s) == s->set.q || !qp_search_resolve(s)) return BATTEN_OK;
   }
 }
 
@@ -303,20 +294,24 @@ static void go_back(qp_search *s) {
 static batten_status solve(qp_search *s) {
   const size_t FRESH = 3; /* times at most */
   size_t fresh = 0;
+  bool arrived = false; /* x is the minimiser on the rows in sight */
   batten_status st = start(s);
   while (st == BATTEN_OK) {
-    if (s->have_safe)
-      go_back(s);
-    else
-      st = qp_phase1(s);
+    size_t before = s->point->iterations;
+    if (!s->have_safe) st = qp_phase1(s);
     if (st != BATTEN_OK) break;
     if (!s->have_safe && survey(s)) continue;
-    size_t before = s->point->iterations;
-    st = descend(s);
-    if (st < 0 || survey(s)) continue;
+    if (!arrived) st = descend(s);
+    if (st < 0) break;
+    if (survey(s)) {
+      arrived = s->have_safe && qp_search_meet(s, &st);
+      if (s->have_safe && !arrived) go_back(s);
+      continue;
+    }
     bool settled = fresh > 0 && s->point->iterations - before <= s->n;
     if (st != BATTEN_OK || settled || fresh++ == FRESH) break;
     st = refactor(s);
+    arrived = false;
   }
   return st;
 }

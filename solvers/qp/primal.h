@@ -49,14 +49,14 @@ typedef struct qp_search {
   double *safe_value; /* [m] of all constraints, at safe */
   double *new_value;  /* [m] at the point surveyed */
   bool have_safe;
-  size_t drops; /* members dropped since x moved */
+  size_t stuck; /* times that degeneracy was resolved since x moved */
   size_t since; /* pivots since values were computed from x */
 } qp_search;
 
 enum { QP_SEEN = 1, QP_MEMBER = 2, QP_SKIPPED = 4, QP_NEW = 8 };
 
-/* Drops at one point before its degeneracy is resolved. */
-enum { QP_PATIENCE = 3 };
+/* Times that a point may be come back to before what moves it must be rounding. */
+enum { QP_PATIENCE = 20 };
 
 /* By how much more than its own rounding a row may be missed when it cannot be met better: it depends on members,
  * whose errors it has then as well. */
@@ -89,9 +89,13 @@ void qp_search_direction(qp_search *s);
 void qp_search_multipliers(qp_search *s);
 /* The member whose multiplier is most wrong beyond rounding, by what the objective gains without it; q if none. */
 size_t qp_search_wrong(qp_search *s);
-/* Degeneracy: exchanges members with the rows that are zero at x until p leads away from none of them and no
- * multiplier is wrong. False if p is then zero up to rounding: x is optimal. */
+/* Where multipliers are wrong at the minimiser x: exchanges members with the rows that are met at x until p leads
+ * away from none of them and no multiplier is wrong. False if p is then zero up to rounding: x is optimal; or if that
+ * is all that it has been for long. */
 bool qp_search_resolve(qp_search *s);
+/* From the minimiser x on the working set, its multipliers right, to that on all rows in sight, by dual steps for
+ * those that are violated. False when rounding is in the way. *st: as of qp_search_pivot(). */
+bool qp_search_meet(qp_search *s, batten_status *st);
 
 /* From x to a point where the rows in sight hold, on the working set as it is and becomes. E_INFEASIBLE: there is
  * none; point->y has the proof. */

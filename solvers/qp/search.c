@@ -97,7 +97,7 @@ bool qp_search_move(qp_search *s, double alpha) {
     remember(s);
   }
   bool moved = length > qp_search_error(s->n) * size;
-  if (moved) s->drops = 0;
+  if (moved) s->stuck = 0;
   return moved;
 }
 
@@ -198,26 +198,26 @@ static signed char met_side(const qp_search *s, size_t place) {
 }
 
 /* The row zero at x that p leads away from most; sighted if none. */
-static size_t most_left(qp_search *s, double *by) {
+static size_t most_left(qp_search *s, signed char *side, double *by) {
   size_t worst = s->sighted;
   *by = qp_search_error(s->n) * norm(s->n, s->p);
-  qp_search_slopes(s);
   for (size_t i = 0; i < s->sighted; i++) {
     if (s->is[s->sight[i]] & (QP_MEMBER | QP_SKIPPED)) continue;
-    signed char side = met_side(s, i);
-    double away = -sign_of(side) * s->slope[i];
-    if (side == QP_FREE || away <= *by) continue;
+    signed char met = met_side(s, i);
+    if (met == QP_FREE) continue;
+    double away = -sign_of(met) * qp_rows_dot(s->rows, s->sight[i], s->p);
+    if (away <= *by || (!isinf(s->weight) && away <= s->rounding[i])) continue; /* aim has the errors of x */
+    *side = met;
     *by = away;
     worst = i;
   }
   return worst;
 }
 
-/* One step of the dual method for the row at a place, which p leads away from by so much: members whose multipliers
- * reach zero on the way leave. */
-static void dual_step(qp_search *s, size_t place, double by) {
+/* One step of the dual method [Goldfarb, Idnani 1983] for the row at a place, which the minimiser on the working set
+ * misses by so much on this side: members whose multipliers reach zero on the way leave. */
+static void dual_step(qp_search *s, size_t place, signed char side, double by) {
   size_t k = s->sight[place];
-  signed char side = met_side(s, place);
   double sign = sign_of(side);
   for (;;) {
     size_t q = s->set.q, leaving = q;
@@ -238,6 +238,7 @@ static void dual_step(qp_search *s, size_t place, double by) {
       if (!depends) {
         qp_active_add(&s->set, k, side, s->d);
         s->is[k] |= QP_MEMBER;
+        s->value[place] = side == QP_UPPER ? s->rows->upper[k] : s->rows->lower[k];
       } else
         s->is[k] |= QP_SKIPPED; /* made up of equalities and rows that cannot give way: zero on both sides */
       return;
@@ -246,26 +247,76 @@ static void dual_step(qp_search *s, size_t place, double by) {
     memmove(s->y + leaving, s->y + leaving + 1, (q - leaving - 1) * sizeof *s->y);
     by -= step * across * across;
     qp_search_drop(s, leaving);
+    s->point->iterations++;
   }
 }
 
+static void forget_skipped(qp_search *s) {
+  for (size_t i = 0; i < s->sighted; i++) s->is[s->sight[i]] &= (unsigned char)~QP_SKIPPED;
+}
+
+static size_t most_steps(const qp_search *s) { return 20 * (s->n + s->sighted); }
+
 bool qp_search_resolve(qp_search *s) {
+  if (++s->stuck > QP_PATIENCE) return false;
   for (;;) {
     qp_search_direction(s);
     qp_search_multipliers(s);
     size_t wrong = qp_search_wrong(s);
     if (wrong == s->set.q) break;
     qp_search_drop(s, wrong);
+    s->point->iterations++;
   }
 
-  size_t place, rounds = 0, most_rounds = 20 * (s->n + s->sighted);
+  size_t place, steps = 0;
+  signed char side = QP_FREE;
   double by;
-  while ((place = most_left(s, &by)) < s->sighted && rounds++ < most_rounds) {
-    dual_step(s, place, by);
+  while ((place = most_left(s, &side, &by)) < s->sighted && steps++ < most_steps(s)) {
+    dual_step(s, place, side, by);
+    s->point->iterations++;
     qp_search_direction(s);
     qp_search_multipliers(s);
   }
-  for (size_t i = 0; i < s->sighted; i++) s->is[s->sight[i]] &= (unsigned char)~QP_SKIPPED;
+  forget_skipped(s);
   if (isinf(s->weight)) return qp_phase1_falls(s);
   return norm(s->n, s->p) > qp_search_error(s->n) * norm(s->n, s->x);
+}
+
+/* ---- Rows that came into sight ---- */
+
+/* The row in sight that x misses most; sighted if none. */
+static size_t most_missed(const qp_search *s, signed char *side, double *by) {
+  size_t worst = s->sighted;
+  *by = 0;
+  for (size_t i = 0; i < s->sighted; i++) {
+    size_t k = s->sight[i];
+    if (s->is[k] & (QP_MEMBER | QP_SKIPPED)) continue;
+    double lower = s->rows->lower[k] - s->value[i], upper = s->value[i] - s->rows->upper[k];
+    double out = fmax(lower, upper);
+    if (out <= *by || out <= qp_search_tolerance(s, i, lower > upper ? s->rows->lower[k] : s->rows->upper[k]))
+      continue;
+    *by = out;
+    *side = lower > upper ? QP_LOWER : QP_UPPER;
+    worst = i;
+  }
+  return worst;
+}
+
+bool qp_search_meet(qp_search *s, batten_status *st) {
+  size_t place, steps = 0;
+  signed char side = QP_FREE;
+  double by;
+  *st = BATTEN_OK;
+  while ((place = most_missed(s, &side, &by)) < s->sighted && *st == BATTEN_OK && steps++ < most_steps(s)) {
+    dual_step(s, place, side, by);
+    if (s->is[s->sight[place]] & QP_SKIPPED) break;
+    *st = qp_search_pivot(s);
+    qp_search_direction(s);
+    qp_search_multipliers(s);
+    qp_search_slopes(s);
+    qp_search_move(s, 1);
+    memcpy(s->x, s->aim, s->n * sizeof *s->x);
+  }
+  forget_skipped(s);
+  return place == s->sighted && *st == BATTEN_OK && qp_search_wrong(s) == s->set.q;
 }
