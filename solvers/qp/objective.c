@@ -8,6 +8,7 @@
 #include "objective.h"
 
 #include <float.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "base/checked.h"
@@ -170,7 +171,40 @@ typedef struct row_source {
   const qp_objective *o;
   const double *root; /* [n][n] of H, or NULL */
   size_t rank;
+  struct sized_row *order;
 } row_source;
+
+typedef struct sized_row {
+  double size;
+  size_t row;
+} sized_row;
+
+static int larger_first(const void *one, const void *other) {
+  const sized_row *a = one, *b = other;
+  if (a->size != b->size) return a->size < b->size ? 1 : -1;
+  return a->row < b->row ? -1 : a->row > b->row;
+}
+
+/* Large rows first: then reflections keep the small digits of small rows, and weights may be 1e20 apart [Cox, Higham
+ * 1998, Stability of Householder QR factorization for weighted least squares problems]. */
+static void order_rows(const row_source *s) {
+  const qp_objective *o = s->o;
+  for (size_t i = 0; i < o->k; i++) {
+    qp_matrix_row row = qp_row_of(o->problem->a, i);
+    double largest = 0;
+    for (size_t e = 0; e < row.count; e++) {
+      double size = fabs(row.values[e]) / o->metric[qp_row_column(&row, e)];
+      largest = size > largest ? size : largest;
+    }
+    s->order[i] = (sized_row){sqrt(weight_of(o->problem, i)) * largest, i};
+  }
+  for (size_t i = 0; i < s->rank; i++) {
+    double largest = 0;
+    for (size_t j = 0; j < o->n; j++) largest = fmax(largest, fabs(s->root[i + j * o->n]) / o->metric[j]);
+    s->order[o->k + i] = (sized_row){largest, o->k + i};
+  }
+  qsort(s->order, o->k + s->rank, sizeof *s->order, larger_first);
+}
 
 /* Row i of the scaled [W^1/2 A | W^1/2 b; U | 0] -> row `at` of block [n + 1][ld]. */
 static void put_row(const row_source *s, size_t i, double *block, size_t at, size_t ld) {
@@ -211,7 +245,7 @@ static batten_status reduce_rows(batten_context *ctx, const row_source *source, 
   if (!out) goto done;
   do {
     size_t filled = kept;
-    while (next < all && filled < ld) put_row(source, next++, block, filled++, ld);
+    while (next < all && filled < ld) put_row(source, source->order[next++].row, block, filled++, ld);
     st = batten_la_geqrf(ctx, filled, n + 1, block, ld, tau);
     if (st < 0) goto done;
     kept = filled < n ? filled : n;
@@ -236,16 +270,23 @@ done:
 static batten_status make_triangle(batten_context *ctx, const qp_objective *o) {
   struct qp_objective_state *state = o->state;
   if (state->triangle) return BATTEN_OK;
-  batten_status st = BATTEN_OK;
+  batten_status st;
   row_source source = {.o = o};
   double *root = NULL;
   if (o->problem->h) {
     root = batten_alloc_array(ctx, o->n, o->n * sizeof *root);
     if (!root) return BATTEN_E_NOMEM;
     st = qp_hessian_root(ctx, o->problem->h, root, &source.rank);
+    if (st < 0) goto done;
     source.root = root;
   }
-  if (st >= 0) st = reduce_rows(ctx, &source, &state->triangle, &state->rows);
+  st = BATTEN_E_NOMEM;
+  source.order = batten_alloc_array(ctx, o->k + source.rank, sizeof *source.order);
+  if (!source.order) goto done;
+  order_rows(&source);
+  st = reduce_rows(ctx, &source, &state->triangle, &state->rows);
+done:
+  batten_free(ctx, source.order);
   batten_free(ctx, root);
   return st;
 }

@@ -201,6 +201,39 @@ static void test_condition(batten_context *ctx) {
   free(a), free(s);
 }
 
+/* Weights 1e16 apart: the heavy rows hold to rounding, and the others' solution among what is left is as good as if
+ * the heavy ones were constraints. Two unknowns are held, x_0 + x_1 = 1 and x_1 - x_2 = 0.5, wherever their rows
+ * stand. */
+static void test_weights(batten_context *ctx) {
+  enum { N = 3, K = 40 };
+  uint64_t seed = 8;
+  for (size_t at = 0; at < K; at += K / 2 - 1) {
+    double a[K * N], b[K], w[K], r[N * N], x[N], ray[N], square = 0, along = 0;
+    for (size_t i = 0; i < K; i++) {
+      b[i] = uniform(&seed), w[i] = 1;
+      for (size_t j = 0; j < N; j++) a[i * N + j] = uniform(&seed);
+    }
+    memcpy(a + at * N, (double[]){1, 1, 0, 0, 1, -1}, 2 * N * sizeof *a);
+    b[at] = 1, b[at + 1] = 0.5, w[at] = w[at + 1] = 1e16;
+    /* x = (1, 0, -0.5) + t (-1, 1, 1), t by least squares of the light rows: right to 1e-16 */
+    for (size_t i = 0; i < K; i++) {
+      if (i == at || i == at + 1) continue;
+      double slope = a[i * N + 1] + a[i * N + 2] - a[i * N];
+      square += slope * slope, along += slope * (b[i] - (a[i * N] - 0.5 * a[i * N + 2]));
+    }
+    batten_matrix rows = batten_matrix_dense(K, N, a);
+    batten_qp_problem p = {.struct_size = sizeof p, .n = N, .a = &rows, .b = b, .weights = w};
+    qp_objective o;
+    size_t index;
+    T_OK(qp_objective_new(ctx, &p, &o), ctx);
+    T_OK(qp_objective_factor(ctx, &o, 0, r, x, &index, ray), ctx);
+    batten_la_trsv(BATTEN_LA_DOUBLE, 'U', 'N', N, r, N, x);
+    T_RATIO(fabs(x[1] - along / square) + fabs(x[0] - 1 + x[1]) + fabs(x[1] - x[2] - 0.5), 1e-14,
+            "heavy rows from %zu on", at);
+    qp_objective_free(ctx, &o);
+  }
+}
+
 /* Columns times powers of two: the same bits of R, so scaled, and the same target. */
 static void test_scaling(batten_context *ctx) {
   enum { N = 9, K = 30 };
@@ -489,10 +522,11 @@ int main(void) {
   test_by_hand(ctx);
   test_factors(ctx);
   test_condition(ctx);
+  test_weights(ctx);
   test_scaling(ctx);
   test_indefinite(ctx);
   test_small_indefinite(ctx);
-  for (size_t n = 70; n < 1e5; n *= 30) {
+  for (size_t n = 70; n < 100000; n *= 30) {
     test_sparse_indefinite(ctx, n, 1e-3, n);
     test_sparse_indefinite(ctx, n, 0, n);
     test_sparse_indefinite(ctx, n, -1e-8, n);
