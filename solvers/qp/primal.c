@@ -203,7 +203,7 @@ static batten_status take_members(qp_search *s, bool met) {
   size_t count = 0;
   size_t *k = (size_t *)s->breaks;
   signed char *side = (signed char *)(k + s->m);
-  for (size_t i = 0; i < s->m; i++) {
+  for (size_t i = 0; i < s->m && count < s->n; i++) {
     signed char given = s->point->active[i];
     double bound = given == QP_UPPER ? s->rows->upper[i] : s->rows->lower[i];
     if ((given != QP_LOWER && given != QP_UPPER) || !isfinite(bound) || qp_rows_is_equality(s->rows, i)) continue;
@@ -372,22 +372,29 @@ done:
 }
 
 qp_cost qp_primal_cost(const qp_rows *rows) {
-  size_t n = rows->n, m = rows->m, longest = m > n ? m : n, part, bytes = 0;
-  batten_mul3(n, n, 5 * sizeof(double), &part); /* R^-1, J, T; normals and J2' of qp_active_add_many() */
+  size_t n = rows->n, m = rows->m, longest = m > n ? m : n, at_once = n, part, bytes = 0;
+  double entries = 0;
+  for (size_t k = 0, equalities = 0; k < m; k++) {
+    const double *values;
+    const uint32_t *columns;
+    entries += (double)qp_rows_entries(rows, k, &values, &columns);
+    equalities += qp_rows_is_equality(rows, k);
+    at_once = equalities > at_once ? equalities : at_once;
+  }
+  const size_t BLOCKS = 24 * 128;               /* headers */
+  batten_mul3(n, n, 3 * sizeof(double), &part); /* R^-1, J, T */
+  batten_add(BLOCKS, part, &bytes);
+  batten_mul3(n + 1, at_once, 2 * sizeof(double),
+              &part); /* qp_active_add_many(): normals, or J2'; their projections */
   batten_add(bytes, part, &bytes);
-  batten_mul(n, (VECTORS + 8) * sizeof(double), &part);
+  batten_mul(n + 64, (64 + 4 + VECTORS + 5) * sizeof(double), &part); /* LAPACK's blocks of 64; vectors */
   batten_add(bytes, part, &bytes);
   batten_mul(m, ROW_VECTORS * sizeof(double) + sizeof(size_t) + 1, &part);
   batten_add(bytes, part, &bytes);
   batten_mul3(longest, 2, sizeof(qp_break), &part);
   batten_add(bytes, part, &bytes);
 
-  /* Pivots: about 2 n at 10 n^2 and a look at 4 n rows each; surveys: about 10. */
-  double nd = (double)n, entries = 0;
-  for (size_t k = 0; k < m; k++) {
-    const double *values;
-    const uint32_t *columns;
-    entries += (double)qp_rows_entries(rows, k, &values, &columns);
-  }
-  return (qp_cost){bytes, 2 * nd * (10 + 8) * nd * nd + 10 * 2 * entries};
+  /* Some pivots for each unknown, at 10 n^2 and a look at 8 n rows each; about 10 surveys of all rows. */
+  double pivots = 4 * fmin((double)n, (double)m) + 8, square = (double)n * (double)n;
+  return (qp_cost){bytes, (double)n * square + pivots * (10 + 16) * square + 10 * 2 * entries};
 }
