@@ -137,6 +137,22 @@ static void test_empty(batten_context *ctx) {
           "workspace of nothing");
 }
 
+/* Pivoted Cholesky of diag(4, 1e-4, 9, 0, 1e-9): the tolerance decides where it stops. */
+static void test_pivoted(batten_context *ctx) {
+  static const double diagonal[] = {4, 1e-4, 9, 0, 1e-9}, tolerance[] = {-1, 1e-8, 1e-3, 10};
+  static const size_t order[] = {2, 0, 1, 4}, ranks[] = {4, 3, 2, 0};
+  for (size_t q = 0; q < sizeof ranks / sizeof *ranks; q++) {
+    double a[25] = {0};
+    size_t pivots[5], rank = 9;
+    for (size_t j = 0; j < 5; j++) a[6 * j] = diagonal[j];
+    T_OK(batten_la_pstrf(ctx, 5, a, 5, tolerance[q], pivots, &rank), ctx);
+    bool right = rank == ranks[q];
+    for (size_t j = 0; j < rank; j++)
+      right = right && pivots[j] == order[j] && fabs(a[6 * j] - sqrt(diagonal[order[j]])) < 1e-15;
+    T_CHECK(right, "pivoted Cholesky down to %g: rank %zu", tolerance[q], rank);
+  }
+}
+
 /* The estimate is exact for a diagonal. */
 static void scale_by_index(void *arg, double *x) {
   for (size_t i = 0; i < *(size_t *)arg; i++) x[i] *= (double)(i + 1);
@@ -167,6 +183,7 @@ int main(void) {
     test_packed(ctx, BATTEN_LA_FLOAT, sizes[q]);
   }
   test_empty(ctx);
+  test_pivoted(ctx);
   test_estimate(ctx);
   test_blas();
   T_CHECK(batten_bytes_in_use(ctx) == 0, "all memory is given back");
