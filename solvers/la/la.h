@@ -45,8 +45,8 @@ void batten_la_trsm(batten_la_real real, char side, char uplo, char trans, size_
 size_t batten_la_potrf(batten_la_real real, char uplo, size_t n, void *a, size_t lda);
 
 /* Cholesky with diagonal pivoting of a semidefinite matrix, upper triangle: P'AP = U'U with *rank rows of U, column j
- * of AP being column pivots[j] of A. Stops where the diagonal left is at most tolerance; a negative one stands for
- * n eps / 2 times the largest. */
+ * of AP being column pivots[j] of A. Stops where the diagonal left is at most tolerance, but not before
+ * the first pivot if that is positive; a negative tolerance stands for n eps / 2 times the largest. */
 batten_status batten_la_pstrf(batten_context *ctx, size_t n, double *a, size_t lda, double tolerance, size_t *pivots,
                               size_t *rank);
 

@@ -140,7 +140,7 @@ static void test_empty(batten_context *ctx) {
 /* Pivoted Cholesky of diag(4, 1e-4, 9, 0, 1e-9): the tolerance decides where it stops. */
 static void test_pivoted(batten_context *ctx) {
   static const double diagonal[] = {4, 1e-4, 9, 0, 1e-9}, tolerance[] = {-1, 1e-8, 1e-3, 10};
-  static const size_t order[] = {2, 0, 1, 4}, ranks[] = {4, 3, 2, 0};
+  static const size_t order[] = {2, 0, 1, 4}, ranks[] = {4, 3, 2, 1};
   for (size_t q = 0; q < sizeof ranks / sizeof *ranks; q++) {
     double a[25] = {0};
     size_t pivots[5], rank = 9;
