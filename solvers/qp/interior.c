@@ -25,10 +25,12 @@ typedef struct ip {
   double *y, *tl, *tu, *vl, *vu, *ax, *rl, *ru;            /* [m] */
   double *dy, *adx, *dtl, *dtu, *dvl, *dvu, *cl, *cu, *r2; /* [m] */
   double *best_y;
+  double *kept_x, *kept_rows; /* [n], [6 m]: the step from dy on */
   ip_polish_work work;
   double lag_primal, lag_dual; /* residuals before the last step */
   double mu;
-  double error; /* relative, of the last step's equations */
+  double value_scale; /* size of the objective, as the gap is judged */
+  double error;       /* relative, of the last step's equations */
   ip_figures figures, best;
   bool have_best;
 } ip;
@@ -81,7 +83,12 @@ static void residuals(ip *p) {
   }
   p->mu = p->sides ? sum / (double)p->sides : 0;
   qp_scaled_hessian(s, p->x, p->rd);
-  for (size_t j = 0; j < s->n; j++) p->rd[j] += s->g[j];
+  double value = 0;
+  for (size_t j = 0; j < s->n; j++) {
+    value += p->x[j] * (p->rd[j] / 2 + s->g[j]);
+    p->rd[j] += s->g[j];
+  }
+  p->value_scale = s->cost + fabs(value);
   qp_scaled_add(s, -1, p->y, p->rd);
 }
 
@@ -182,6 +189,22 @@ static void aim_centre(ip *p, double target) {
   }
 }
 
+/* Gondzio's correction: products of a trial point a little further out, brought back into [beta, 1/beta] target. */
+static double bring_back(double product, double target) {
+  const double BETA = 0.1;
+  double low = BETA * target, high = target / BETA;
+  if (product < low) return low - product;
+  if (product > high) return fmax(high - product, -high);
+  return 0;
+}
+
+static void aim_correct(ip *p, double target, double a, double b) {
+  for (size_t k = 0; k < p->s->m; k++) {
+    p->cl[k] += bring_back((p->tl[k] + a * p->dtl[k]) * (p->vl[k] + b * p->dvl[k]), target);
+    p->cu[k] += bring_back((p->tu[k] + a * p->dtu[k]) * (p->vu[k] + b * p->dvu[k]), target);
+  }
+}
+
 static void advance(ip *p, double a, double b) {
   for (size_t j = 0; j < p->s->n; j++) p->x[j] += a * p->dx[j];
   for (size_t k = 0; k < p->s->m; k++) {
@@ -242,20 +265,21 @@ static void classify(ip *p) {
   }
 }
 
-enum { VECTORS_N = 8, VECTORS_M = 21 };
+enum { VECTORS_N = 9, VECTORS_M = 21, KEPT_M = 6 };
 
 static batten_status ip_new(batten_context *ctx, const qp_scaled *s, ip *p) {
   size_t n = s->n, m = s->m;
   ip_polish_work *w = &p->work;
-  double **of_n[VECTORS_N] = {&p->x, &p->dx, &p->rd, &p->r1, &p->best_x, &w->x, &w->dx, &w->r1};
+  double **of_n[VECTORS_N] = {&p->x, &p->dx, &p->rd, &p->r1, &p->best_x, &w->x, &w->dx, &w->r1, &p->kept_x};
   double **of_m[VECTORS_M] = {&p->y,  &p->tl, &p->tu,  &p->vl,     &p->vu,  &p->ax,  &p->rl,
                               &p->ru, &p->dy, &p->adx, &p->dtl,    &p->dtu, &p->dvl, &p->dvu,
                               &p->cl, &p->cu, &p->r2,  &p->best_y, &w->y,   &w->dy,  &w->r2};
-  double *at = batten_alloc_array(ctx, VECTORS_N * n + VECTORS_M * m, sizeof *at);
+  double *at = batten_alloc_array(ctx, VECTORS_N * n + (VECTORS_M + KEPT_M) * m, sizeof *at);
   if (!at) return BATTEN_E_NOMEM;
-  memset(at, 0, (VECTORS_N * n + VECTORS_M * m) * sizeof *at);
+  memset(at, 0, (VECTORS_N * n + (VECTORS_M + KEPT_M) * m) * sizeof *at);
   for (size_t v = 0; v < VECTORS_N; v++, at += n) *of_n[v] = at;
   for (size_t v = 0; v < VECTORS_M; v++, at += m) *of_m[v] = at;
+  p->kept_rows = at;
   p->kind = batten_alloc_array(ctx, m, 2);
   if (!p->kind) return BATTEN_E_NOMEM;
   w->tried = (signed char *)p->kind + m;
@@ -283,7 +307,7 @@ static void keep_best(ip *p) {
 /* Regularisation: less where it held a residual up (the last step, of length a, left more than it should have), more
  * where the systems could not be solved with it. */
 static void regularize(ip *p, size_t count, double a, double b) {
-  const double START = 1e-6, LEAST = 1e-14, LAG = 0.1;
+  const double START = 1e-6, LEAST = 1e-14, LAG = 0.1, WRONG = 1e-2;
   double primal = 0, dual = 0;
   for (size_t k = 0; k < p->s->m; k++) primal = fmax(primal, fmax(fabs(p->rl[k]), fabs(p->ru[k])));
   for (size_t j = 0; j < p->s->n; j++) dual = fmax(dual, fabs(p->rd[j]));
@@ -292,7 +316,7 @@ static void regularize(ip *p, size_t count, double a, double b) {
   else {
     if (primal > (1 - a + LAG) * p->lag_primal) p->delta = fmax(p->delta / 10, LEAST);
     if (dual > (1 - b + LAG) * p->lag_dual) p->newton.rho = fmax(p->newton.rho / 10, LEAST);
-    if (p->error > 1e-5) {
+    if (p->error > WRONG) {
       p->delta = fmin(100 * p->delta, START);
       p->newton.rho = fmin(100 * p->newton.rho, START);
     }
@@ -301,9 +325,31 @@ static void regularize(ip *p, size_t count, double a, double b) {
   p->lag_dual = dual;
 }
 
+/* Lengthens the step by further right sides, each as cheap as a solve, as long as that pays. The step's six vectors
+ * by row lie one behind the other. */
+static void correct_centrality(ip *p, double target, double *a, double *b) {
+  const int MOST = 3;
+  const double FURTHER = 0.08, LONG = 1.9, WORTH = 0.02;
+  size_t bytes_n = p->s->n * sizeof(double), bytes_m = 6 * p->s->m * sizeof(double);
+  for (int c = 0; c < MOST && *a + *b < LONG; c++) {
+    double a0 = *a, b0 = *b;
+    memcpy(p->kept_x, p->dx, bytes_n);
+    memcpy(p->kept_rows, p->dy, bytes_m);
+    aim_correct(p, target, fmin(1, (1 + FURTHER) * a0 + FURTHER), fmin(1, (1 + FURTHER) * b0 + FURTHER));
+    step(p);
+    longest(p, a, b);
+    if (*a + *b >= a0 + b0 + WORTH) continue;
+    *a = a0;
+    *b = b0;
+    memcpy(p->dx, p->kept_x, bytes_n);
+    memcpy(p->dy, p->kept_rows, bytes_m);
+    return;
+  }
+}
+
 /* Predictor and corrector; *a, *b: longest steps of x and t, of y and v. */
 static void direction(ip *p, double *a, double *b) {
-  const double TOO_WRONG = 1e-4, LEAST = 1e-6;
+  const double TOO_WRONG = 0.1, LEAST = 1e-6;
   weights(p);
   ip_newton_factor(&p->newton, 0, 0);
   aim_zero(p);
@@ -316,21 +362,27 @@ static void direction(ip *p, double *a, double *b) {
   if (p->sides == 0) return;
   double both = fmin(*a, *b), ratio = mu_after(p, both, both) / p->mu;
   double sigma = fmin(1, fmax(1e-8, ratio * ratio * ratio));
-  aim_centre(p, sigma * p->mu);
+  /* Below what the gap asks for, products only lose digits while residuals are still on their way. */
+  double least = 1e-4 * p->limits->tolerance * p->value_scale / (double)p->sides;
+  double target = fmax(sigma * p->mu, least);
+  aim_centre(p, target);
   step(p);
   longest(p, a, b);
+  correct_centrality(p, target, a, b);
 }
 
 static batten_status iterate(batten_context *ctx, ip *p, size_t *count) {
-  const size_t PATIENCE = 30; /* steps without a better point */
+  const size_t PATIENCE = 30; /* steps without a better point or smaller mu */
   size_t idle = 0;
+  double least_mu = INFINITY;
   double a = 0, b = 0;
   for (*count = 0;; ++*count) {
     double before = p->have_best ? p->best.merit : INFINITY;
     residuals(p);
     keep_best(p);
     if (p->best.merit <= p->limits->tolerance) return BATTEN_OK;
-    idle = p->best.merit < 0.9 * before ? 0 : idle + 1;
+    idle = p->best.merit < 0.9 * before || p->mu < 0.5 * least_mu ? 0 : idle + 1;
+    least_mu = fmin(least_mu, p->mu);
     if (idle > PATIENCE || !isfinite(p->figures.merit)) return BATTEN_W_ACCURACY;
     batten_status st = qp_limits_check(ctx, p->limits, *count, 1 - 1 / (1 + 0.1 * (double)*count));
     if (st < 0) return st;
@@ -432,7 +484,7 @@ batten_status qp_interior_cost(batten_context *ctx, const batten_matrix *h, cons
   if (st < 0) goto done;
   st = qp_kkt_new(ctx, &s.h, &s.c, &kkt);
   if (st < 0) goto done;
-  size_t vectors = (VECTORS_N + 4) * s.n + (VECTORS_M + 4) * s.m;
+  size_t vectors = (VECTORS_N + 4) * s.n + (VECTORS_M + KEPT_M + 4) * s.m + (2 * IP_KRYLOV + 1) * (s.n + s.m);
   size_t entries = s.h.starts[s.n] + s.c.starts[s.general] + s.n + s.m;
   out->bytes = s.bytes + kkt.bytes + vectors * sizeof(double) + 2 * s.m;
   out->flops = STEPS * (kkt.flops + FLOPS_OF_STEP_PER_ENTRY * (double)entries);

@@ -14,6 +14,8 @@ typedef struct ip_figures {
   double primal, dual, gap, merit;
 } ip_figures;
 
+enum { IP_KRYLOV = 6 }; /* vectors for where refinement stalls */
+
 /* The system  (H + rho) dx - rows' dy = r1,   rows dx + w dy = r2,   and the vectors to solve it with. */
 typedef struct ip_newton {
   const qp_scaled *s;
@@ -25,6 +27,7 @@ typedef struct ip_newton {
   double *q1, *q2;         /* [n], [m] residual, then correction */
   double *best_x, *best_y; /* [n], [m] */
   double *hx;              /* [n] scratch */
+  double *krylov;          /* [2 IP_KRYLOV + 1][n + m] */
   size_t factorizations;
 } ip_newton;
 

@@ -17,11 +17,14 @@ batten_status ip_newton_new(batten_context *ctx, const qp_scaled *s, ip_newton *
   out->q1 = out->d + n;
   out->best_x = out->d + 2 * n;
   out->hx = out->d + 3 * n;
+  out->krylov = batten_alloc_array(ctx, n + m, (2 * IP_KRYLOV + 1) * sizeof *out->krylov);
+  if (!out->krylov) return BATTEN_E_NOMEM;
   return qp_kkt_new(ctx, &s->h, &s->c, &out->kkt);
 }
 
 void ip_newton_free(batten_context *ctx, ip_newton *k) {
   qp_kkt_free(ctx, &k->kkt);
+  batten_free(ctx, k->krylov);
   batten_free(ctx, k->w);
   *k = (ip_newton){0};
 }
@@ -37,16 +40,16 @@ void ip_newton_factor(ip_newton *k, double rho_least, double w_least) {
   k->factorizations++;
 }
 
-/* q := r - system (dx, dy); returns its size: rows count by what they change in y. */
+/* q := r - system (dx, dy), r NULL: 0; returns its size: rows count by what they change in y. */
 static double residual(ip_newton *k, const double *r1, const double *r2, const double *dx, const double *dy) {
   const qp_scaled *s = k->s;
   double size = 0;
   qp_scaled_hessian(s, dx, k->hx);
-  for (size_t j = 0; j < s->n; j++) k->q1[j] = r1[j] - k->hx[j] - k->rho * dx[j];
+  for (size_t j = 0; j < s->n; j++) k->q1[j] = (r1 ? r1[j] : 0) - k->hx[j] - k->rho * dx[j];
   qp_scaled_add(s, 1, dy, k->q1);
   qp_scaled_rows(s, dx, k->q2);
   for (size_t i = 0; i < s->m; i++) {
-    k->q2[i] = r2[i] - k->q2[i] - k->w[i] * dy[i];
+    k->q2[i] = (r2 ? r2[i] : 0) - k->q2[i] - k->w[i] * dy[i];
     size = fmax(size, fabs(k->q2[i]) / fmax(1, k->w[i]));
   }
   for (size_t j = 0; j < s->n; j++) size = fmax(size, fabs(k->q1[j]));
@@ -64,28 +67,110 @@ static void correct(ip_newton *k, double *dx, double *dy) {
     dy[i] += (k->q2[i] - k->q1[s->column[i - s->general]]) / k->factored_w[i];
 }
 
+/* Weight of a row in inner products, as in residual(). */
+static double weight(const ip_newton *k, size_t i) { return 1 / fmax(1, k->w[i]); }
+
+static double product(const ip_newton *k, const double *a, const double *b) {
+  size_t n = k->s->n, m = k->s->m;
+  double sum = 0;
+  for (size_t j = 0; j < n; j++) sum += a[j] * b[j];
+  for (size_t i = 0; i < m; i++) sum += a[n + i] * b[n + i] * weight(k, i) * weight(k, i);
+  return sum;
+}
+
+static void copy_scaled(size_t count, double factor, const double *from, double *to) {
+  for (size_t i = 0; i < count; i++) to[i] = factor * from[i];
+}
+
+/* Where refinement stalls, because the factored system is too far from the wanted one in a few directions: flexible
+ * GMRES [Saad, SIAM J. Sci. Comput. 14 (1993) 461] with the factor as preconditioner finds those. Improves dx, dy for
+ * which q1, q2 is the residual of size `before`; returns the size that is left. */
+static double krylov(ip_newton *k, const double *r1, const double *r2, double *dx, double *dy) {
+  enum { DEPTH = IP_KRYLOV };
+  const qp_scaled *s = k->s;
+  size_t n = s->n, m = s->m, all = n + m, used = 0;
+  double h[DEPTH + 1][DEPTH], cosine[DEPTH], sine[DEPTH], beta[DEPTH + 1];
+  double *v = k->krylov, *z = v + (DEPTH + 1) * all;
+  copy_scaled(n, 1, k->q1, v);
+  copy_scaled(m, 1, k->q2, v + n);
+  beta[0] = sqrt(product(k, v, v));
+  if (!(beta[0] > 0) || !isfinite(beta[0])) return INFINITY;
+  copy_scaled(all, 1 / beta[0], v, v);
+  for (; used < DEPTH; used++) {
+    double *vi = v + used * all, *next = vi + all, *zi = z + used * all;
+    memset(zi, 0, all * sizeof *zi);
+    copy_scaled(n, 1, vi, k->q1);
+    copy_scaled(m, 1, vi + n, k->q2);
+    correct(k, zi, zi + n);
+    residual(k, NULL, NULL, zi, zi + n); /* q := - system z */
+    copy_scaled(n, -1, k->q1, next);
+    copy_scaled(m, -1, k->q2, next + n);
+    for (size_t p = 0; p <= used; p++) {
+      double dot = product(k, next, v + p * all);
+      h[p][used] = dot;
+      for (size_t i = 0; i < all; i++) next[i] -= dot * v[p * all + i];
+    }
+    double norm = sqrt(product(k, next, next));
+    h[used + 1][used] = norm;
+    if (norm > 0) copy_scaled(all, 1 / norm, next, next);
+    for (size_t p = 0; p < used; p++) {
+      double a = h[p][used], b = h[p + 1][used];
+      h[p][used] = cosine[p] * a + sine[p] * b;
+      h[p + 1][used] = cosine[p] * b - sine[p] * a;
+    }
+    double a = h[used][used], b = norm, root = hypot(a, b);
+    if (!(root > 0) || !isfinite(root)) break;
+    cosine[used] = a / root, sine[used] = b / root;
+    h[used][used] = root;
+    beta[used + 1] = -sine[used] * beta[used];
+    beta[used] *= cosine[used];
+    if (fabs(beta[used + 1]) <= 1e-13 * beta[0] || norm == 0) {
+      used++;
+      break;
+    }
+  }
+  for (size_t p = used; p-- > 0;) {
+    for (size_t c = p + 1; c < used; c++) beta[p] -= h[p][c] * beta[c];
+    beta[p] /= h[p][p];
+    for (size_t j = 0; j < n; j++) dx[j] += beta[p] * z[p * all + j];
+    for (size_t i = 0; i < m; i++) dy[i] += beta[p] * z[p * all + n + i];
+  }
+  return residual(k, r1, r2, dx, dy);
+}
+
 double ip_newton_solve(ip_newton *k, const double *r1, const double *r2, double *dx, double *dy) {
-  const int ROUNDS = 8;
-  const double ENOUGH = 1e-14;
+  const int ROUNDS = 8, CYCLES = 2;
+  const double ENOUGH = 1e-14, TOO_LARGE = 1e-9;
   const qp_scaled *s = k->s;
   size_t bytes_n = s->n * sizeof *dx, bytes_m = s->m * sizeof *dy;
   memset(dx, 0, bytes_n);
   memset(dy, 0, bytes_m);
   double size = residual(k, r1, r2, dx, dy), best = size;
   if (size == 0) return 0;
-  for (int round = 0; round < ROUNDS; round++) {
+  bool slow = false;
+  int cycles = 0;
+  for (int round = 0; round < ROUNDS && best > ENOUGH * size; round++) {
     memcpy(k->best_x, dx, bytes_n);
     memcpy(k->best_y, dy, bytes_m);
-    correct(k, dx, dy);
-    double now = residual(k, r1, r2, dx, dy);
+    if (slow && (best <= TOO_LARGE * size || cycles == CYCLES)) break;
+    double now;
+    if (slow) {
+      now = krylov(k, r1, r2, dx, dy);
+      cycles++;
+    } else {
+      correct(k, dx, dy);
+      now = residual(k, r1, r2, dx, dy);
+    }
     if (!(now < best)) {
       memcpy(dx, k->best_x, bytes_n);
       memcpy(dy, k->best_y, bytes_m);
-      break;
+      if (slow) break;
+      residual(k, r1, r2, dx, dy);
+      slow = true;
+      continue;
     }
-    bool slow = now > 0.3 * best;
+    slow = slow || now > 0.3 * best;
     best = now;
-    if (best <= ENOUGH * size || slow) break;
   }
   return best / size;
 }
