@@ -24,6 +24,7 @@ typedef struct gatherer {
   double *sum;     /* [n] */
   size_t *seen;    /* [n] row + 1 in which an unknown was last met */
   uint32_t *found; /* [n] columns met in this row */
+  size_t *length;  /* [n] of each row */
 } gatherer;
 
 static void gatherer_free(batten_context *ctx, gatherer *g) {
@@ -33,6 +34,7 @@ static void gatherer_free(batten_context *ctx, gatherer *g) {
   batten_free(ctx, g->sum);
   batten_free(ctx, g->seen);
   batten_free(ctx, g->found);
+  batten_free(ctx, g->length);
 }
 
 /* starts[j + 1] := entries of column j that are not zero; returns all of them. */
@@ -83,7 +85,9 @@ static batten_status gatherer_new(batten_context *ctx, const batten_qp_problem *
   g->seen = batten_alloc_array(ctx, n, sizeof *g->seen);
   if (!g->seen) return BATTEN_E_NOMEM;
   g->found = batten_alloc_array(ctx, n, sizeof *g->found);
-  return g->found ? BATTEN_OK : BATTEN_E_NOMEM;
+  if (!g->found) return BATTEN_E_NOMEM;
+  g->length = batten_alloc_array(ctx, n, sizeof *g->length);
+  return g->length ? BATTEN_OK : BATTEN_E_NOMEM;
 }
 
 /* Meets the entries of a row: adds factor * (by * value), so that P_ij and P_ji are the same bits. */
@@ -145,17 +149,16 @@ batten_status qp_objective_sparse(batten_context *ctx, const qp_objective *o, qp
   batten_status st = gatherer_new(ctx, o->problem, &g);
   if (st < 0) goto done;
   memset(g.seen, 0, n * sizeof *g.seen);
-  for (size_t i = 0; i < n; i++) entries += gather(&g, i);
+  for (size_t i = 0; i < n; i++) entries += g.length[i] = gather(&g, i);
   st = take_arrays(ctx, n, entries, &block, bytes);
   if (st < 0) goto done;
   size_t *starts = (size_t *)(void *)block;
   double *values = (double *)(void *)(block + bytes[0]), *q = (double *)(void *)(block + bytes[0] + bytes[1]);
   uint32_t *indices = (uint32_t *)(void *)(block + bytes[0] + bytes[1] + bytes[2]);
 
-  /* lengths of rows, which are those of columns; then each row is written as a column */
-  memset(g.seen, 0, n * sizeof *g.seen);
+  /* lengths of rows are those of columns; each row is written as a column */
   starts[0] = 0;
-  for (size_t i = 0; i < n; i++) starts[i + 1] = starts[i] + gather(&g, i);
+  for (size_t i = 0; i < n; i++) starts[i + 1] = starts[i] + g.length[i];
   memset(g.seen, 0, n * sizeof *g.seen);
   for (size_t i = 0; i < n; i++) {
     size_t count = gather(&g, i);
