@@ -26,8 +26,7 @@ typedef struct row_value {
 static row_value row_at(const batten_matrix *c, size_t i, const double *x) {
   row_value v = {0};
   if (c->dense) {
-    /* Two running sums, as the loop over all rows is where the time goes. */
-    const double *row = c->dense + i * c->columns;
+    const double *row = c->dense + i * c->columns; /* two running sums: the loop over all rows is where the time goes */
     double sum[2] = {0}, size[2] = {0};
     size_t terms = 0, j = 0, last = 0;
     for (; j + 2 <= c->columns; j += 2) {
@@ -41,7 +40,8 @@ static row_value row_at(const batten_matrix *c, size_t i, const double *x) {
       terms += is_term;
       last = is_term ? j : last;
     }
-    return (row_value){sum[0] + sum[1], size[0] + size[1], terms, row[last], x[last]};
+    if (terms > 0) v = (row_value){sum[0] + sum[1], size[0] + size[1], terms, row[last], x[last]};
+    return v;
   }
   for (size_t e = c->starts[i]; e < c->starts[i + 1]; e++) {
     double a = c->values[e], b = x[c->indices[e]];
@@ -316,39 +316,46 @@ static double distance(size_t n, const double *x, const double *z) {
   return sqrt(square);
 }
 
+/* x0 where it is inside and not too near the rows, else a point that is found, else what x0 gives. z, other: scratch. */
+static batten_status own_blend(batten_context *ctx, const asked *a, const qp_rows *rows, const qp_limits *limits,
+                               const double *x0, const double *x, double *z, double *other, double *out, double *blend) {
+  const double NEAR = 1e-6;
+  size_t n = a->problem->n;
+  bool started = x0 && is_interior(a, x0, z);
+  if (started) *blend = smallest_blend(a, x, z, out);
+  if (started && *blend <= NEAR) return BATTEN_OK;
+  batten_status st = find_interior(ctx, a, rows, limits, x, z);
+  if (st != BATTEN_OK) return started && st == BATTEN_W_ACCURACY ? BATTEN_OK : st;
+  double found = smallest_blend(a, x, z, other);
+  if (started && distance(n, x, out) <= distance(n, x, other)) return BATTEN_OK;
+  *blend = found;
+  for (size_t j = 0; j < n; j++) out[j] = other[j];
+  return BATTEN_OK;
+}
+
 batten_status qp_exact(batten_context *ctx, const batten_qp_problem *problem, const qp_rows *rows,
                        const qp_limits *limits, const double *interior, const double *x0, double *x, double *blend) {
-  const double NEAR = 1e-6; /* a start that asks for more is too close to the rows: another one is tried beside it */
   size_t n = problem->n;
   asked a = {.problem = problem, .m = problem->c ? problem->c->rows : 0};
+  double fraction = 0;
   batten_status st = BATTEN_E_NOMEM;
   double *clipped = batten_alloc_array(ctx, n, sizeof *clipped), *z = batten_alloc_array(ctx, n, sizeof *z);
   double *out = batten_alloc_array(ctx, n, sizeof *out), *other = batten_alloc_array(ctx, n, sizeof *other);
   if (!clipped || !z || !out || !other) goto done;
-  blend_to(problem, x, x, 0, clipped);
-  double e = 0, better;
   st = BATTEN_OK;
+  for (size_t j = 0; j < n; j++) clipped[j] = x[j];
+  clip(problem, clipped);
   if (next_failing(&a, 0, clipped) == a.m) {
     for (size_t j = 0; j < n; j++) out[j] = clipped[j];
   } else if (interior) {
     st = take_interior(ctx, &a, interior, z);
-    if (st == BATTEN_OK) e = smallest_blend(&a, clipped, z, out);
+    if (st == BATTEN_OK) fraction = smallest_blend(&a, clipped, z, out);
   } else {
-    bool started = x0 && is_interior(&a, x0, z);
-    if (started) e = smallest_blend(&a, clipped, z, out);
-    if (!started || e > NEAR) {
-      st = find_interior(ctx, &a, rows, limits, clipped, z);
-      better = st == BATTEN_OK ? smallest_blend(&a, clipped, z, other) : 1;
-      if (st == BATTEN_OK && (!started || distance(n, clipped, other) < distance(n, clipped, out))) {
-        e = better;
-        for (size_t j = 0; j < n; j++) out[j] = other[j];
-      }
-      if (started && st == BATTEN_W_ACCURACY) st = BATTEN_OK;
-    }
+    st = own_blend(ctx, &a, rows, limits, x0, clipped, z, other, out, &fraction);
   }
   if (st != BATTEN_OK) goto done;
   for (size_t j = 0; j < n; j++) x[j] = out[j];
-  *blend = e;
+  *blend = fraction;
 done:
   batten_free(ctx, clipped);
   batten_free(ctx, z);

@@ -1,0 +1,98 @@
+/* Random quadratic programs with a known solution, solved by every engine and judged: the property test runs some hundreds,
+ * the benchmark ten thousand. A trial passes when
+ *   - the status is BATTEN_OK,
+ *   - primal and dual residual and gap are within 1e-9 of their scales, recomputed in long double,
+ *   - x is the known solution within 10 n eps times the condition of the Hessian (of a semidefinite one, whose solution need not
+ *     be unique, the objective is the known one within 1e-9),
+ *   - and so it agrees with every other engine.
+ * Excluded, as beyond double precision: none with a condition up to 1e10, the most that is generated. */
+#ifndef QP_TRIALS_H
+#define QP_TRIALS_H
+
+#include "qp_check.h"
+
+/* Index as in qp_engines. */
+typedef struct qp_trials {
+  size_t runs[4], passed[4], semidefinite[4], semidefinite_passed[4];
+  double primal[4], dual[4], gap[4], off[4]; /* the worst: over scales; off over what is allowed */
+  double seconds[4];
+  size_t pivots[4];
+  size_t failures; /* printed so far */
+} qp_trials;
+
+typedef struct qp_trial_result {
+  batten_status status;
+  qp_verdict verdict;
+  double primal, dual, gap; /* over their scales */
+  double off;               /* over what is allowed */
+  bool passed;
+} qp_trial_result;
+
+/* Scales below this are those of a problem that is nearly nothing; all data are of size one. */
+#define QP_TRIAL_LEAST 0.01
+
+static inline double qp_trial_allowed(const qp_scene_spec *spec, const qp_verdict *v) {
+  return 10 * (double)spec->n * 0x1p-52 * spec->condition * (1 + v->dual_scale);
+}
+
+static inline qp_trial_result qp_trial_judge(const qp_scene_spec *spec, const qp_scene *s, batten_status status,
+                                             const double *x, const double *y) {
+  qp_trial_result r = {.status = status, .primal = INFINITY, .dual = INFINITY, .gap = INFINITY, .off = INFINITY};
+  if (status != BATTEN_OK && status != BATTEN_W_ACCURACY) return r;
+  r.verdict = qp_check(&s->problem, x, y);
+  r.primal = r.verdict.primal / fmax(r.verdict.primal_scale, QP_TRIAL_LEAST);
+  r.dual = r.verdict.dual / fmax(r.verdict.dual_scale, QP_TRIAL_LEAST);
+  r.gap = r.verdict.gap / fmax(r.verdict.gap_scale, QP_TRIAL_LEAST);
+  double off = 0;
+  for (size_t j = 0; j < spec->n; j++) off = fmax(off, fabs(x[j] - s->x[j]));
+  r.off = off / qp_trial_allowed(spec, &r.verdict);
+  if (spec->null) {
+    qp_verdict known = qp_check(&s->problem, s->x, s->y);
+    r.off = fabs(r.verdict.objective - known.objective) / (1e-9 * fmax(known.gap_scale, QP_TRIAL_LEAST));
+  }
+  r.passed = status == BATTEN_OK && qp_check_within(&r.verdict, 1e-9, QP_TRIAL_LEAST) && r.off <= 1;
+  return r;
+}
+
+static inline void qp_trials_print_failure(qp_trials *t, uint64_t number, const qp_scene_spec *p, int engine,
+                                           const qp_trial_result *r, const char *text) {
+  if (++t->failures > 40) return;
+  printf("# number %llu (n %zu, m %zu, condition %.1e, null %zu, equalities %zu, active %zu, bounded %zu%s%s%s%s%s) by %s: %s, "
+         "primal %.2g, dual %.2g, gap %.2g, off %.2g of what is allowed %s\n",
+         (unsigned long long)number, p->n, p->m, p->condition, p->null, p->equalities, p->active, p->bounded,
+         p->bounds ? ", bounds" : "", p->lsq ? ", lsq" : "", p->sparse ? ", sparse" : "", p->two_sided ? ", two-sided" : "",
+         p->weak ? ", weak" : "", qp_engine_names[engine], batten_status_name(r->status), r->primal, r->dual, r->gap, r->off,
+         text);
+}
+
+/* Runs the problem of a number by the engines of a mask (bit i: qp_engines[i]). */
+static inline void qp_trials_run(batten_context *ctx, batten_qp_workspace *workspace, qp_trials *t, uint64_t number,
+                                 const qp_scene_spec *spec, unsigned mask) {
+  qp_scene *s = qp_scene_random(spec);
+  double *x = qp_scene_array(s, spec->n, sizeof *x), *y = qp_scene_array(s, spec->n + spec->m, sizeof *y);
+  for (int e = 0; e < 4; e++) {
+    if (!(mask >> e & 1)) continue;
+    batten_qp_options o = batten_qp_options_default();
+    batten_qp_info info = {0};
+    batten_qp_solution solution = {.x = x, .multipliers = y};
+    o.engine = qp_engines[e];
+    double start = batten_now();
+    batten_status status = batten_qp_solve(ctx, &s->problem, &o, workspace, &solution, &info);
+    t->seconds[e] += batten_now() - start;
+    t->pivots[e] += info.iterations;
+    qp_trial_result r = qp_trial_judge(spec, s, status, x, y);
+    t->runs[e]++;
+    t->passed[e] += r.passed;
+    t->semidefinite[e] += spec->null > 0;
+    t->semidefinite_passed[e] += spec->null > 0 && r.passed;
+    if (!r.passed) qp_trials_print_failure(t, number, spec, e, &r, status == BATTEN_OK ? "" : batten_error(ctx));
+    if (!r.passed) continue;
+    t->primal[e] = fmax(t->primal[e], r.primal);
+    t->dual[e] = fmax(t->dual[e], r.dual);
+    t->gap[e] = fmax(t->gap[e], r.gap);
+    t->off[e] = fmax(t->off[e], r.off);
+  }
+  qp_scene_free(s);
+}
+
+#endif
