@@ -67,7 +67,7 @@ static void expect_solved(batten_context *ctx, tally *t, size_t seed, const batt
     double off = 0, size = 1;
     for (size_t j = 0; x && j < p->n; j++) off = fmax(off, fabs(o->x[j] - x[j])), size = fmax(size, fabs(x[j]));
     if (!isnan(objective)) off = fmax(off, fabs(v.objective - objective)), size = fmax(size, fabs(objective));
-    bool within = qp_check_within(&v, 1e-9, 1), honest = fabs(o->info.primal_residual - v.primal) <= 1e-15 + 1e-6 * v.primal;
+    bool within = qp_check_within(&v, 1e-9, 1), honest = fabs(o->info.primal_residual - v.primal) <= 0x1p-51 * fmax(v.primal_scale, 1) + 1e-6 * v.primal;
     snprintf(text, sizeof text, "primal %.2g (said %.2g), dual %.2g of %.2g, gap %.2g of %.2g, x off by %.2g", v.primal,
              o->info.primal_residual, v.dual, v.dual_scale, v.gap, v.gap_scale, off);
     count(t, e, seed, within && honest && off <= near * size, off / size, text);
