@@ -1,5 +1,5 @@
-/* The judge of quadratic programs in tests and benchmarks: residuals, gap and proofs of a claimed result, in long double
- * and plain loops. Shares nothing with the library. */
+/* The judge of quadratic programs in tests and benchmarks: residuals, gap and proofs of a claimed result, in long
+ * double and plain loops. Shares nothing with the library. */
 #ifndef QP_CHECK_H
 #define QP_CHECK_H
 
@@ -15,7 +15,9 @@ typedef struct qp_verdict {
   double objective;
 } qp_verdict;
 
-static inline long double qp_check_weight(const batten_qp_problem *p, size_t i) { return p->weights ? p->weights[i] : 1; }
+static inline long double qp_check_weight(const batten_qp_problem *p, size_t i) {
+  return p->weights ? p->weights[i] : 1;
+}
 static inline double qp_check_side(const double *sides, size_t i, double none) { return sides ? sides[i] : none; }
 
 /* One constraint: violation, and its part of sum y side. */
@@ -55,8 +57,8 @@ static inline qp_verdict qp_check(const batten_qp_problem *p, const double *x, c
     if (y[i] != 0) qp_scene_add(p->c, i, y[i], pull);
   }
   for (size_t j = 0; j < n; j++) {
-    qp_check_constraint(qp_check_side(p->x_lower, j, -INFINITY), qp_check_side(p->x_upper, j, INFINITY), x[j], y[m + j],
-                        &v, &sides);
+    qp_check_constraint(qp_check_side(p->x_lower, j, -INFINITY), qp_check_side(p->x_upper, j, INFINITY), x[j],
+                        y[m + j], &v, &sides);
     pull[j] += y[m + j];
     double miss = (double)fabsl(px[j] + q[j] - pull[j]);
     v.dual = isnan(miss) ? INFINITY : fmax(v.dual, miss);
@@ -75,8 +77,8 @@ static inline bool qp_check_within(const qp_verdict *v, double tolerance, double
          v->gap <= tolerance * fmax(v->gap_scale, least);
 }
 
-/* How far y is from a proof that no x exists: |C'y_rows + y_bounds| over the sizes of its terms, or INFINITY when the sum of y
- * times sides is not 1. */
+/* How far y is from a proof that no x exists: |C'y_rows + y_bounds| over the sizes of its terms, or INFINITY when the
+ * sum of y times sides is not 1. */
 static inline double qp_check_infeasible(const batten_qp_problem *p, const double *y) {
   size_t n = p->n, m = p->c ? p->c->rows : 0;
   long double *sum = calloc(2 * n + 1, sizeof *sum), *size = sum + n, sides = 0;

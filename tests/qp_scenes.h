@@ -48,7 +48,8 @@ static inline qp_scene *qp_scene_new(size_t n) {
   return s;
 }
 
-/* Uniform integer in [0, count), and a multiple of 2^-8 in [-1, 1]: sums of products of such are exact in a double. */
+/* Uniform integer in [0, count), and a multiple of 2^-8 in [-1, 1]: sums of products of such are exact in a double.
+ */
 static inline size_t qp_scene_pick(uint64_t *seed, size_t count) {
   return (size_t)(scene_uniform(seed) * (double)count);
 }
@@ -62,8 +63,8 @@ typedef struct qp_scene_rows {
 } qp_scene_rows;
 
 static inline qp_scene_rows qp_scene_rows_new(qp_scene *s, size_t rows, size_t entries) {
-  return (qp_scene_rows){0, qp_scene_array(s, rows + 1, sizeof(size_t)),
-                         qp_scene_array(s, entries, sizeof(uint32_t)), qp_scene_array(s, entries, sizeof(double))};
+  return (qp_scene_rows){0, qp_scene_array(s, rows + 1, sizeof(size_t)), qp_scene_array(s, entries, sizeof(uint32_t)),
+                         qp_scene_array(s, entries, sizeof(double))};
 }
 static inline void qp_scene_entry(qp_scene_rows *r, size_t column, double value) {
   size_t at = r->starts[r->rows + 1]++;
@@ -106,7 +107,7 @@ typedef struct qp_scene_spec {
   bool lsq;          /* the objective as least squares, else as Hessian */
   bool sparse;       /* rows of at most 8 entries */
   bool two_sided;
-  bool weak;         /* an eighth of the active rows has multiplier 0 */
+  bool weak; /* an eighth of the active rows has multiplier 0 */
 } qp_scene_spec;
 
 /* What makes an orthogonal matrix here: a few reflections I - 2 v v'. */
@@ -221,7 +222,8 @@ static inline void qp_scene_random_hessian(qp_scene *s, const qp_scene_spec *spe
   s->problem.g = g;
 }
 
-/* A = U D V'. Where A has full rank, b = A x - U D^-1 V' target and there is no g; else b = A x - r and g makes up. */
+/* A = U D V'. Where A has full rank, b = A x - U D^-1 V' target and there is no g; else b = A x - r and g makes up.
+ */
 static inline void qp_scene_random_lsq(qp_scene *s, const qp_scene_spec *spec, const long double *target,
                                        uint64_t *seed) {
   size_t n = spec->n, k = n + qp_scene_pick(seed, n + 1);
@@ -244,7 +246,8 @@ static inline void qp_scene_random_lsq(qp_scene *s, const qp_scene_spec *spec, c
   s->problem.b = b;
   for (size_t i = 0; i < k; i++) column[i] = i < n ? (double)target[i] : 0;
   qp_scene_reflect(n, v, true, column);
-  for (size_t j = 0; j < n; j++) column[j] = spec->null ? scene_uniform(seed) : column[j] / qp_scene_singular(spec, j);
+  for (size_t j = 0; j < n; j++)
+    column[j] = spec->null ? scene_uniform(seed) : column[j] / qp_scene_singular(spec, j);
   qp_scene_reflect(k, u, false, column);
   for (size_t i = 0; i < k; i++) b[i] = (double)(qp_scene_dot(&s->a, i, s->x) - column[i]);
   if (!spec->null) return;
@@ -274,8 +277,8 @@ static inline qp_scene *qp_scene_random(const qp_scene_spec *spec) {
   return s;
 }
 
-/* The problem of a number: n from 2 to most_n and m to most_m (both more often small), condition 1 to 1e10, and a mixture
- * of all kinds. A twentieth is semidefinite. */
+/* The problem of a number: n from 2 to most_n and m to most_m (both more often small), condition 1 to 1e10, and a
+ * mixture of all kinds. A twentieth is semidefinite. */
 static inline qp_scene_spec qp_scene_spec_random(uint64_t number, size_t most_n, size_t most_m) {
   uint64_t seed = number * 0x9e3779b97f4a7c15u + 1;
   qp_scene_spec p = {.seed = number};
@@ -302,10 +305,11 @@ static inline qp_scene_spec qp_scene_spec_random(uint64_t number, size_t most_n,
 /* ---- convex Bezier patch ------------------------------------------------------------------------------------- */
 
 /* Bidegree (3, 3), control points b[4 i + j], unknowns 3 (4 i + j) + coordinate. For each box of a grid the first
- * derivatives must stay in two cones, and for each extreme normal of these the second fundamental form must be positive along P
- * pairs of neighbouring directions: all linear and homogeneous. */
+ * derivatives must stay in two cones, and for each extreme normal of these the second fundamental form must be
+ * positive along P pairs of neighbouring directions: all linear and homogeneous. */
 typedef struct qp_patch_map {
-  double s[4][4], d1[3][4], d1_raised[4][4], d2_raised[4][4]; /* Bezier points and derivatives on [a, b], raised to 3 */
+  double s[4][4], d1[3][4], d1_raised[4][4],
+      d2_raised[4][4]; /* Bezier points and derivatives on [a, b], raised to 3 */
 } qp_patch_map;
 
 static inline qp_patch_map qp_patch_map_new(double a, double b) {
@@ -333,7 +337,9 @@ static inline void qp_patch_cross(const double *a, const double *b, double *out)
   out[1] = a[2] * b[0] - a[0] * b[2];
   out[2] = a[0] * b[1] - a[1] * b[0];
 }
-static inline double qp_patch_dot(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+static inline double qp_patch_dot(const double *a, const double *b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
 static inline void qp_patch_normalise(double *a) {
   double length = sqrt(qp_patch_dot(a, a));
   for (int c = 0; c < 3; c++) a[c] /= length;
@@ -384,8 +390,8 @@ static inline bool qp_patch_cone_new(size_t count, double (*vectors)[3], const d
   return true;
 }
 
-/* Extreme rays of the cone of all cross products: vertices of the convex hull (gift wrapping) of their central projection
- * along g. Returns how many, 0 if a product points away from g. */
+/* Extreme rays of the cone of all cross products: vertices of the convex hull (gift wrapping) of their central
+ * projection along g. Returns how many, 0 if a product points away from g. */
 static inline size_t qp_patch_normals(const qp_patch_cone *u, const qp_patch_cone *v, const double *g,
                                       double (*out)[3]) {
   double all[16][3], flat[16][2], e[2][3], help[3] = {fabs(g[0]) < 0.5, fabs(g[0]) >= 0.5, 0};
@@ -427,7 +433,8 @@ static inline void qp_patch_row(const double *w, const double *direction, double
   for (int e = 0; e < 48; e++) row[e] /= sqrt(square);
 }
 
-/* Directions of the form's rows in the metric of its mean: z_a = M^-1/2 (cos, sin)(a pi / P). False if M is not definite. */
+/* Directions of the form's rows in the metric of its mean: z_a = M^-1/2 (cos, sin)(a pi / P). False if M is not
+ * definite. */
 static inline bool qp_patch_metric(const double *mean, double *root, double *sign) {
   double a = mean[0], b = mean[1], d = mean[2], det = a * d - b * b;
   *sign = a > 0 ? 1 : -1;
@@ -439,7 +446,8 @@ static inline bool qp_patch_metric(const double *mean, double *root, double *sig
   return true;
 }
 
-/* Rows of one box into rows [..][48]; the least value of the form's rows at the net (1 = that of the mean) in *least. */
+/* Rows of one box into rows [..][48]; the least value of the form's rows at the net (1 = that of the mean) in *least.
+ */
 static inline size_t qp_patch_box(const double *net, const qp_patch_map *u, const qp_patch_map *v, size_t directions,
                                   double delta, double *rows, double *least) {
   double w[16], xu[12][3], xv[12][3], g[3], mu[3] = {0}, mv[3] = {0}, normals[16][3];
@@ -509,8 +517,8 @@ static inline void qp_patch_net(double *net) {
 /* Boxes in u and v, and P: 352, 2,496, 9,856 and 27,104 rows. */
 static const size_t qp_patch_sizes[4][3] = {{1, 1, 4}, {2, 3, 5}, {4, 7, 4}, {7, 11, 4}};
 
-/* Samples [side][side] of a surface that is convex but flat along a curve, with noise: the best fit without rows is not
- * convex. hessian: A'A and -A'b instead of A and b. */
+/* Samples [side][side] of a surface that is convex but flat along a curve, with noise: the best fit without rows is
+ * not convex. hessian: A'A and -A'b instead of A and b. */
 static inline qp_scene *qp_scene_patch(size_t size, bool hessian, uint64_t seed) {
   enum { SIDE = 20, N = 48, DELTAS = 7 };
   static const double deltas[DELTAS] = {1, .5, .25, .12, .06, .03, .015};
@@ -572,12 +580,16 @@ static inline qp_scene *qp_scene_patch(size_t size, bool hessian, uint64_t seed)
 /* ---- planar curve that keeps turning left -------------------------------------------------------------------- */
 
 /* Uniform cubic spline, control points d_0 .. d_{N-1} (unknowns x_0, y_0, x_1, ...), reference a spiral whose legs of
- * length one turn by 0.1 to 0.2 each. On each span the Bezier legs D1 must lie between u and v, and the second differences D2 between v
- * and -u [Juettler, the lemma on linear sufficient conditions]: after what is redundant has gone, 6 rows of 8 entries. */
+ * length one turn by 0.1 to 0.2 each. On each span the Bezier legs D1 must lie between u and v, and the second
+ * differences D2 between v and -u [Juettler, the lemma on linear sufficient conditions]: after what is redundant has
+ * gone, 6 rows of 8 entries. */
 
 /* The weights of d_s .. d_{s+3} in: Bezier legs 0 .. 2, second differences 0, 1. */
-static const double qp_curve_legs[5][4] = {
-    {-1. / 6, 0, 1. / 6, 0}, {0, -1. / 3, 1. / 3, 0}, {0, -1. / 6, 0, 1. / 6}, {1. / 6, -1. / 3, 1. / 6, 0}, {0, 1. / 6, -1. / 3, 1. / 6}};
+static const double qp_curve_legs[5][4] = {{-1. / 6, 0, 1. / 6, 0},
+                                           {0, -1. / 3, 1. / 3, 0},
+                                           {0, -1. / 6, 0, 1. / 6},
+                                           {1. / 6, -1. / 3, 1. / 6, 0},
+                                           {0, 1. / 6, -1. / 3, 1. / 6}};
 
 static inline double qp_curve_angle(const double *weights, const double *points) {
   double x = 0, y = 0;
@@ -613,7 +625,8 @@ static inline qp_scene *qp_scene_curve(size_t controls, double noise, uint64_t s
   qp_scene_rows c = qp_scene_rows_new(s, 6 * spans, 6 * spans * 8);
   for (size_t i = 0; i < spans; i++) {
     const double *p = s->start + 2 * i;
-    double mean = qp_curve_angle(qp_curve_legs[1], p), theta[2] = {INFINITY, -INFINITY}, phi[2] = {INFINITY, -INFINITY};
+    double mean = qp_curve_angle(qp_curve_legs[1], p), theta[2] = {INFINITY, -INFINITY},
+           phi[2] = {INFINITY, -INFINITY};
     for (int k = 0; k < 5; k++) {
       double *range = k < 3 ? theta : phi;
       double angle = qp_curve_near(qp_curve_angle(qp_curve_legs[k], p), mean + (k < 3 ? 0 : SCENE_PI / 2));
@@ -637,7 +650,8 @@ static inline qp_scene *qp_scene_curve(size_t controls, double noise, uint64_t s
   for (size_t k = 0; k < 2 * SAMPLES * spans; k++) {
     size_t i = k / 2 / SAMPLES;
     double t = ((double)(k / 2 % SAMPLES) + 0.5) / SAMPLES, r = 1 - t, value = noise * (2 * scene_uniform(&seed) - 1);
-    double w[4] = {r * r * r / 6, (3 * t * t * t - 6 * t * t + 4) / 6, (3 * r * r * r - 6 * r * r + 4) / 6, t * t * t / 6};
+    double w[4] = {r * r * r / 6, (3 * t * t * t - 6 * t * t + 4) / 6, (3 * r * r * r - 6 * r * r + 4) / 6,
+                   t * t * t / 6};
     qp_scene_row_begin(&a);
     for (size_t q = 0; q < 4; q++) {
       qp_scene_entry(&a, 2 * (i + q) + k % 2, w[q]);
@@ -654,8 +668,8 @@ static inline qp_scene *qp_scene_curve(size_t controls, double noise, uint64_t s
 
 /* ---- k-convex sequences -------------------------------------------------------------------------------------- */
 
-/* min 1/2 |x - data|^2, k-th differences >= 0, 1 <= k <= 5. The powers 0, 1, .. k of the index, the last with a positive
- * factor, are strictly feasible. */
+/* min 1/2 |x - data|^2, k-th differences >= 0, 1 <= k <= 5. The powers 0, 1, .. k of the index, the last with a
+ * positive factor, are strictly feasible. */
 static inline qp_scene *qp_scene_convex(size_t n, size_t k, double noise, uint64_t seed) {
   qp_scene *s = qp_scene_new(n);
   qp_scene_rows c = qp_scene_rows_new(s, n - k, (n - k) * (k + 1)), h = qp_scene_rows_new(s, n, n);

@@ -1,9 +1,9 @@
-/* Random quadratic programs with a known solution, solved by every engine and judged: the property test runs some hundreds,
- * the benchmark ten thousand. A trial passes when
+/* Random quadratic programs with a known solution, solved by every engine and judged: the property test runs some
+ * hundreds, the benchmark ten thousand. A trial passes when
  *   - the status is BATTEN_OK,
  *   - primal and dual residual and gap are within 1e-9 of their scales, recomputed in long double,
- *   - x is the known solution within 10 n eps times the condition of the Hessian (of a semidefinite one, whose solution need not
- *     be unique, the objective is the known one within 1e-9),
+ *   - x is the known solution within 10 n eps times the condition of the Hessian (of a semidefinite one, whose
+ * solution need not be unique, the objective is the known one within 1e-9),
  *   - and so it agrees with every other engine.
  * Excluded, as beyond double precision: none with a condition up to 1e10, the most that is generated. */
 #ifndef QP_TRIALS_H
@@ -57,12 +57,14 @@ static inline qp_trial_result qp_trial_judge(const qp_scene_spec *spec, const qp
 static inline void qp_trials_print_failure(qp_trials *t, uint64_t number, const qp_scene_spec *p, int engine,
                                            const qp_trial_result *r, const char *text) {
   if (++t->failures > 40) return;
-  printf("# number %llu (n %zu, m %zu, condition %.1e, null %zu, equalities %zu, active %zu, bounded %zu%s%s%s%s%s) by %s: %s, "
-         "primal %.2g, dual %.2g, gap %.2g, off %.2g of what is allowed %s\n",
-         (unsigned long long)number, p->n, p->m, p->condition, p->null, p->equalities, p->active, p->bounded,
-         p->bounds ? ", bounds" : "", p->lsq ? ", lsq" : "", p->sparse ? ", sparse" : "", p->two_sided ? ", two-sided" : "",
-         p->weak ? ", weak" : "", qp_engine_names[engine], batten_status_name(r->status), r->primal, r->dual, r->gap, r->off,
-         text);
+  printf(
+      "# number %llu (n %zu, m %zu, condition %.1e, null %zu, equalities %zu, active %zu, bounded %zu%s%s%s%s%s) by "
+      "%s: %s, "
+      "primal %.2g, dual %.2g, gap %.2g, off %.2g of what is allowed %s\n",
+      (unsigned long long)number, p->n, p->m, p->condition, p->null, p->equalities, p->active, p->bounded,
+      p->bounds ? ", bounds" : "", p->lsq ? ", lsq" : "", p->sparse ? ", sparse" : "",
+      p->two_sided ? ", two-sided" : "", p->weak ? ", weak" : "", qp_engine_names[engine],
+      batten_status_name(r->status), r->primal, r->dual, r->gap, r->off, text);
 }
 
 /* Runs the problem of a number by the engines of a mask (bit i: qp_engines[i]). */

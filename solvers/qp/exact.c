@@ -1,15 +1,17 @@
 /* Feasibility that is exact. See exact.h.
  *
  * A row c'x of k products that are not zero is c'x (1 + errors) however it is summed: any order is within
- * gamma_k sum|c_j x_j| of the exact value, gamma_k = k u / (1 - k u) [Higham, Accuracy and Stability, 3.1], and so is the
- * sum that we form ourselves. So slack >= twice that bound, of the x that is returned, proves the row for everybody.
+ * gamma_k sum|c_j x_j| of the exact value, gamma_k = k u / (1 - k u) [Higham, Accuracy and Stability, 3.1], and so is
+ * the sum that we form ourselves. So slack >= twice that bound, of the x that is returned, proves the row for
+ * everybody.
  *
- * Bounds of x need no sum: x is clipped to them. Rows are cured by x + e (z - x), z strictly feasible: e follows from the
- * rows that fail at x, since slack and bound are linear and convex in e. It is then verified on the rounded result.
+ * Bounds of x need no sum: x is clipped to them. Rows are cured by x + e (z - x), z strictly feasible: e follows from
+ * the rows that fail at x, since slack and bound are linear and convex in e. It is then verified on the rounded
+ * result.
  *
- * A z near x is as good as a deep one: with z the projection of x on the rows moved inwards by t, |z - x| / t does not
- * fall with t (it is convex in t and 0 at 0), and e is about (rounding / t). So the first t is small, and smaller ones
- * follow when the inside is narrow. */
+ * A z near x is as good as a deep one: with z the projection of x on the rows moved inwards by t, |z - x| / t does
+ * not fall with t (it is convex in t and 0 at 0), and e is about (rounding / t). So the first t is small, and smaller
+ * ones follow when the inside is narrow. */
 #include "exact.h"
 
 #include <float.h>
@@ -26,7 +28,8 @@ typedef struct row_value {
 static row_value row_at(const batten_matrix *c, size_t i, const double *x) {
   row_value v = {0};
   if (c->dense) {
-    const double *row = c->dense + i * c->columns; /* two running sums: the loop over all rows is where the time goes */
+    const double *row =
+        c->dense + i * c->columns; /* two running sums: the loop over all rows is where the time goes */
     double sum[2] = {0}, size[2] = {0};
     size_t terms = 0, j = 0, last = 0;
     for (; j + 2 <= c->columns; j += 2) {
@@ -118,8 +121,8 @@ static void blend_to(const batten_qp_problem *p, const double *x, const double *
   clip(p, out);
 }
 
-/* Smallest e for one side of a failing row: slack less bound, linear between its values at x and z. The bound gets what
- * rounding of the blended point adds. */
+/* Smallest e for one side of a failing row: slack less bound, linear between its values at x and z. The bound gets
+ * what rounding of the blended point adds. */
 static double side_fraction(const row_value *at_x, const row_value *at_z, double side, double sign) {
   if (isinf(side)) return 0;
   double short_of = 2 * DBL_EPSILON * at_x->size + rounding(at_x) - sign * (at_x->sum - side);
@@ -128,7 +131,8 @@ static double side_fraction(const row_value *at_x, const row_value *at_z, double
   return beyond > 0 ? short_of / (short_of + beyond) : 1;
 }
 
-/* The smallest e, up to a small factor, at which the blend of x and z is proven, and the blend itself in out; z is. */
+/* The smallest e, up to a small factor, at which the blend of x and z is proven, and the blend itself in out; z is.
+ */
 static double smallest_blend(const asked *a, const double *x, const double *z, double *out) {
   const double MORE = 1.25; /* what is left to verify is rounding in e itself: once is nearly always enough */
   double e = 0;
@@ -217,15 +221,16 @@ static void measure(finder *f, const double *x) {
   }
 }
 
-/* Moves both sides of the inequalities inwards by `part` of the row's terms, which is what its rounding is measured by, and a
- * little of everything's size for rows whose terms vanish; at most to a quarter of a narrow row. */
+/* Moves both sides of the inequalities inwards by `part` of the row's terms, which is what its rounding is measured
+ * by, and a little of everything's size for rows whose terms vanish; at most to a quarter of a narrow row. */
 static void move_inwards(finder *f, double part, double all) {
   const double LITTLE = 1e-3, NARROW = 0.25;
   for (size_t k = 0; k < f->rows->m; k++) {
     double lower = f->rows->lower[k], upper = f->rows->upper[k], sides = 0;
     if (isfinite(lower)) sides = fabs(lower);
     if (isfinite(upper)) sides = fmax(sides, fabs(upper));
-    double t = lower == upper ? 0 : fmin(part * fmax(fmax(f->size[k], sides), LITTLE * all), NARROW * (upper - lower));
+    double t =
+        lower == upper ? 0 : fmin(part * fmax(fmax(f->size[k], sides), LITTLE * all), NARROW * (upper - lower));
     f->lower[k] = lower + t;
     f->upper[k] = upper - t;
   }
@@ -275,9 +280,10 @@ static batten_status find_interior(batten_context *ctx, const asked *a, const qp
            ? batten_fail(ctx, BATTEN_W_ACCURACY,
                          "options.exact: a limit was met while looking for a strictly feasible point; give one in "
                          "options.interior or raise the limit")
-           : batten_fail(ctx, BATTEN_W_ACCURACY,
-                         "options.exact: no strictly feasible point was found, so the inside may be empty; state rows that "
-                         "hold as equalities by lower = upper, or give options.interior");
+           : batten_fail(
+                 ctx, BATTEN_W_ACCURACY,
+                 "options.exact: no strictly feasible point was found, so the inside may be empty; state rows that "
+                 "hold as equalities by lower = upper, or give options.interior");
 done:
   finder_free(&f);
   return st;
@@ -291,10 +297,11 @@ static batten_status take_interior(batten_context *ctx, const asked *a, const do
   clip(a->problem, z);
   for (size_t j = 0; j < a->problem->n; j++)
     if (z[j] != interior[j])
-      return batten_fail(ctx, BATTEN_W_ACCURACY,
-                         "options.interior[%zu]: %g is beyond the bound %g; give a strictly feasible point, or NULL to have "
-                         "one found",
-                         j, interior[j], z[j]);
+      return batten_fail(
+          ctx, BATTEN_W_ACCURACY,
+          "options.interior[%zu]: %g is beyond the bound %g; give a strictly feasible point, or NULL to have "
+          "one found",
+          j, interior[j], z[j]);
   size_t bad = next_failing(a, 0, z);
   if (bad == a->m) bad = next_unequal(a, z);
   if (bad == a->m) return BATTEN_OK;
@@ -316,9 +323,11 @@ static double distance(size_t n, const double *x, const double *z) {
   return sqrt(square);
 }
 
-/* x0 where it is inside and not too near the rows, else a point that is found, else what x0 gives. z, other: scratch. */
+/* x0 where it is inside and not too near the rows, else a point that is found, else what x0 gives. z, other: scratch.
+ */
 static batten_status own_blend(batten_context *ctx, const asked *a, const qp_rows *rows, const qp_limits *limits,
-                               const double *x0, const double *x, double *z, double *other, double *out, double *blend) {
+                               const double *x0, const double *x, double *z, double *other, double *out,
+                               double *blend) {
   const double NEAR = 1e-6;
   size_t n = a->problem->n;
   bool started = x0 && is_interior(a, x0, z);

@@ -1,5 +1,5 @@
-/* The generators of quadratic programs, judged before any solver is: the known solution and multipliers are optimal, starts
- * are strictly feasible, sizes are those asked for. */
+/* The generators of quadratic programs, judged before any solver is: the known solution and multipliers are optimal,
+ * starts are strictly feasible, sizes are those asked for. */
 #include "qp_check.h"
 #include "tap.h"
 
@@ -26,7 +26,8 @@ static void test_random(void) {
   T_RATIO(worst[1], 10, "gradient = C'y up to rounding of the data");
   T_RATIO(worst[2], 10, "gap");
   T_CHECK(most_n > 80 && most_m > 2000 && semidefinite > 5 && beyond > 10,
-          "n to %zu, m to %zu, %zu semidefinite, %zu with more active than unknowns", most_n, most_m, semidefinite, beyond);
+          "n to %zu, m to %zu, %zu semidefinite, %zu with more active than unknowns", most_n, most_m, semidefinite,
+          beyond);
 }
 
 /* Smallest singular value by inverse iteration would need a solver; the largest by power iteration is 1, and the
@@ -46,8 +47,8 @@ static void check_start(const char *what, const qp_scene *s) {
   double least = INFINITY, length = 0;
   for (size_t i = 0; i < s->c.rows; i++) least = fmin(least, (double)qp_scene_dot(&s->c, i, s->start));
   for (size_t i = 0; i < s->c.rows; i++) length = fmax(length, s->problem.lower[i]);
-  T_CHECK(least > 0 && length == 0, "%s: %zu unknowns, %zu rows, least at the start %.3g", what, s->problem.n, s->c.rows,
-          least);
+  T_CHECK(least > 0 && length == 0, "%s: %zu unknowns, %zu rows, least at the start %.3g", what, s->problem.n,
+          s->c.rows, least);
 }
 
 static void test_shapes(void) {
@@ -72,7 +73,8 @@ static void test_shapes(void) {
   static const size_t controls[] = {18, 250, 5000};
   for (size_t i = 0; i < 3; i++) {
     qp_scene *s = qp_scene_curve(controls[i], 0.05, 1);
-    T_CHECK(s->problem.n == 2 * controls[i] && s->c.rows == 6 * (controls[i] - 3), "curve of %zu control points", controls[i]);
+    T_CHECK(s->problem.n == 2 * controls[i] && s->c.rows == 6 * (controls[i] - 3), "curve of %zu control points",
+            controls[i]);
     check_start("curve", s);
     qp_scene_free(s);
   }

@@ -1,6 +1,7 @@
-/* What is known to break solvers of quadratic programs, each for every engine: duplicates, zero and scaled rows, a cone
- * collapsed to its apex, rows dependent through equalities, degenerate vertices, cycling examples, infeasible and
- * unbounded problems and their proofs, indefinite by a hair, semidefinite, linear; and what must not change the solution. */
+/* What is known to break solvers of quadratic programs, each for every engine: duplicates, zero and scaled rows, a
+ * cone collapsed to its apex, rows dependent through equalities, degenerate vertices, cycling examples, infeasible
+ * and unbounded problems and their proofs, indefinite by a hair, semidefinite, linear; and what must not change the
+ * solution. */
 #include "qp_check.h"
 #include "tap.h"
 
@@ -67,9 +68,10 @@ static void expect_solved(batten_context *ctx, tally *t, size_t seed, const batt
     double off = 0, size = 1;
     for (size_t j = 0; x && j < p->n; j++) off = fmax(off, fabs(o->x[j] - x[j])), size = fmax(size, fabs(x[j]));
     if (!isnan(objective)) off = fmax(off, fabs(v.objective - objective)), size = fmax(size, fabs(objective));
-    bool within = qp_check_within(&v, 1e-9, 1), honest = fabs(o->info.primal_residual - v.primal) <= 0x1p-51 * fmax(v.primal_scale, 1) + 1e-6 * v.primal;
-    snprintf(text, sizeof text, "primal %.2g (said %.2g), dual %.2g of %.2g, gap %.2g of %.2g, x off by %.2g", v.primal,
-             o->info.primal_residual, v.dual, v.dual_scale, v.gap, v.gap_scale, off);
+    bool within = qp_check_within(&v, 1e-9, 1),
+         honest = fabs(o->info.primal_residual - v.primal) <= 0x1p-51 * fmax(v.primal_scale, 1) + 1e-6 * v.primal;
+    snprintf(text, sizeof text, "primal %.2g (said %.2g), dual %.2g of %.2g, gap %.2g of %.2g, x off by %.2g",
+             v.primal, o->info.primal_residual, v.dual, v.dual_scale, v.gap, v.gap_scale, off);
     count(t, e, seed, within && honest && off <= near * size, off / size, text);
   }
 }
@@ -96,7 +98,8 @@ static void expect_unbounded(batten_context *ctx, tally *t, size_t seed, const b
 
 /* ---- rows that repeat, vanish, or are scaled ----------------------------------------------------------------- */
 
-/* Rows of a dense scene in another order and scale, times over: row i of the result is factor[i] times row from[i]. */
+/* Rows of a dense scene in another order and scale, times over: row i of the result is factor[i] times row from[i].
+ */
 static void rearrange(qp_scene *s, size_t m, const size_t *from, const double *factor) {
   size_t n = s->problem.n;
   double *rows = qp_scene_array(s, m * n, sizeof *rows), *lower = qp_scene_array(s, m, sizeof *lower);
@@ -113,8 +116,14 @@ static void rearrange(qp_scene *s, size_t m, const size_t *from, const double *f
 }
 
 static qp_scene_spec small_spec(uint64_t seed) {
-  return (qp_scene_spec){.seed = seed, .n = 8, .m = 24, .condition = 100, .active = 5, .two_sided = seed % 2 == 1,
-                         .lsq = seed % 3 == 0, .equalities = seed % 4 == 0 ? 2 : 0};
+  return (qp_scene_spec){.seed = seed,
+                         .n = 8,
+                         .m = 24,
+                         .condition = 100,
+                         .active = 5,
+                         .two_sided = seed % 2 == 1,
+                         .lsq = seed % 3 == 0,
+                         .equalities = seed % 4 == 0 ? 2 : 0};
 }
 
 static void test_rows(batten_context *ctx) {
@@ -138,7 +147,8 @@ static void test_rows(batten_context *ctx) {
       double *sides[2] = {NULL, NULL};
       if (kind == 4) { /* 0 * infinity is no side: give them ones */
         sides[0] = qp_scene_array(s, 24, sizeof(double)), sides[1] = qp_scene_array(s, 24, sizeof(double));
-        memcpy(sides[0], s->problem.lower, 24 * sizeof(double)), memcpy(sides[1], s->problem.upper, 24 * sizeof(double));
+        memcpy(sides[0], s->problem.lower, 24 * sizeof(double)),
+            memcpy(sides[1], s->problem.upper, 24 * sizeof(double));
         for (size_t i = 0; i < 24; i++) {
           if (isinf(sides[0][i])) sides[0][i] = -1000;
           if (isinf(sides[1][i])) sides[1][i] = 1000;
@@ -175,11 +185,12 @@ static void test_cone(batten_context *ctx) {
   report(&t), report(&sparse);
 }
 
-/* Rows that are combinations of equalities, with sides that hold with equality up to rounding: the drop-zero example of
- * plane curves with inflections, and random ones. */
+/* Rows that are combinations of equalities, with sides that hold with equality up to rounding: the drop-zero example
+ * of plane curves with inflections, and random ones. */
 static void test_dependent_on_equalities(batten_context *ctx) {
   enum { N = 10, Q = 3, EXTRA = 12 };
-  tally t = {.what = "rows dependent through equalities"}, curve = {.what = "second differences that vanish at an inflection"};
+  tally t = {.what = "rows dependent through equalities"},
+        curve = {.what = "second differences that vanish at an inflection"};
   for (size_t seed = 0; seed < 20; seed++) {
     qp_scene_spec spec = {.seed = seed, .n = N, .m = 24, .condition = 1000, .equalities = Q, .active = 4};
     qp_scene *s = qp_scene_random(&spec);
@@ -207,8 +218,8 @@ static void test_dependent_on_equalities(batten_context *ctx) {
     qp_scene_free(s);
   }
   for (size_t seed = 0; seed < 12; seed++) {
-    /* Points d_0 .. d_6 in the plane, d_2 - 2 d_3 + d_4 = 0, and [w, d_2 - 2 d_3 + d_4] >= 0 for four w, twice; convex to the
-     * left of the inflection, concave to its right, along a reference that is so. */
+    /* Points d_0 .. d_6 in the plane, d_2 - 2 d_3 + d_4 = 0, and [w, d_2 - 2 d_3 + d_4] >= 0 for four w, twice;
+     * convex to the left of the inflection, concave to its right, along a reference that is so. */
     enum { P = 7, ROWS = 2 + 8 + 4 };
     double rows[ROWS * 2 * P] = {0}, lower[ROWS] = {0}, upper[ROWS], h[4 * P * P] = {0}, g[2 * P];
     seed_of_test = seed;
@@ -254,7 +265,8 @@ static void test_degenerate(batten_context *ctx) {
     expect_solved(ctx, seed % 2 ? &weak : &vertex, seed, &s->problem, s->x, NAN, 1e-11);
     qp_scene_free(s);
   }
-  /* x_1 + k 1e-7 x_2 >= 0 for |k| <= 30, towards (-1, -1/2): the outermost row and a face of the wedge or its apex hold. */
+  /* x_1 + k 1e-7 x_2 >= 0 for |k| <= 30, towards (-1, -1/2): the outermost row and a face of the wedge or its apex
+   * hold. */
   for (size_t seed = 0; seed < 4; seed++) {
     enum { M = 61 };
     double rows[M * 2], lower[M] = {0}, h[4] = {1, 0, 0, 1}, g[2] = {1, seed < 2 ? 0.5 : -0.5};
@@ -276,9 +288,11 @@ static void test_degenerate(batten_context *ctx) {
 
 /* Linear programs on which the simplex method cycles, and each with a little of 1/2 |x|^2. */
 static void test_cycling(batten_context *ctx) {
-  static const double beale[] = {.25, -60, -.04, 9, .5, -90, -.02, 3, 0, 0, 1, 0}, beale_cost[] = {-.75, 150, -.02, 6};
+  static const double beale[] = {.25, -60, -.04, 9, .5, -90, -.02, 3, 0, 0, 1, 0},
+                      beale_cost[] = {-.75, 150, -.02, 6};
   static const double kuhn[] = {-2, -9, 1, 9, 1. / 3, 1, -1. / 3, -2, 2, 3, -1, -12}, kuhn_cost[] = {-2, -3, 1, 12};
-  static const double marshall[] = {.5, -5.5, -2.5, 9, .5, -1.5, -.5, 1, 1, 0, 0, 0}, marshall_cost[] = {-10, 57, 9, 24};
+  static const double marshall[] = {.5, -5.5, -2.5, 9, .5, -1.5, -.5, 1, 1, 0, 0, 0},
+                      marshall_cost[] = {-10, 57, 9, 24};
   static const double upper[3][3] = {{0, 0, 1}, {0, 0, 2}, {0, 0, 1}};
   static const struct {
     const double *rows, *cost;
@@ -301,7 +315,8 @@ static void test_cycling(batten_context *ctx) {
 
 /* ---- no solution --------------------------------------------------------------------------------------------- */
 
-/* m rows of which the first n + 1 have sum_i y_i a_i = 0, y > 0, and sum y_i lower_i = gap (sum y = 1): no x when gap > 0. */
+/* m rows of which the first n + 1 have sum_i y_i a_i = 0, y > 0, and sum y_i lower_i = gap (sum y = 1): no x when gap
+ * > 0. */
 static qp_scene *farkas(uint64_t seed, size_t n, size_t m, double gap) {
   qp_scene *s = qp_scene_new(n);
   double *rows = qp_scene_array(s, m * n, sizeof *rows), *lower = qp_scene_array(s, m, sizeof *lower);
@@ -353,7 +368,8 @@ static void test_infeasible(batten_context *ctx) {
     expect_infeasible(ctx, &equal, seed, &s->problem);
     qp_scene_free(s);
   }
-  double rows[6] = {1, 1, 0, 0, 2, 2}, lower[3] = {3, 0, -INFINITY}, upper[3] = {INFINITY, INFINITY, INFINITY}, h[4] = {1, 0, 0, 1};
+  double rows[6] = {1, 1, 0, 0, 2, 2}, lower[3] = {3, 0, -INFINITY}, upper[3] = {INFINITY, INFINITY, INFINITY},
+         h[4] = {1, 0, 0, 1};
   double low[2] = {0, 0}, high[2] = {1, 1.5};
   batten_matrix c = batten_matrix_dense(3, 2, rows), hm = batten_matrix_dense(2, 2, h);
   batten_qp_problem p = batten_qp_problem_default(2);
@@ -393,7 +409,8 @@ static void test_unbounded(batten_context *ctx) {
       lower[i] = uniform();
     }
     for (size_t j = 0; j < 6; j++) g[j] = uniform() - 3 * d[j];
-    batten_matrix c = batten_matrix_dense(5, 6, rows), hm = batten_matrix_dense(6, 6, h), am = batten_matrix_dense(4, 6, a);
+    batten_matrix c = batten_matrix_dense(5, 6, rows), hm = batten_matrix_dense(6, 6, h),
+                  am = batten_matrix_dense(4, 6, a);
     batten_qp_problem p = batten_qp_problem_default(6);
     p.c = &c, p.lower = lower, p.g = g;
     if (seed % 2)
@@ -415,12 +432,14 @@ static void test_unbounded(batten_context *ctx) {
 /* Q diag(1, .., least) Q'. */
 static void test_indefinite(batten_context *ctx) {
   enum { N = 7 };
-  tally found = {.what = "indefinite by 1e-10"}, convex = {.what = "definite by 1e-10"}, diagonal = {.what = "negative diagonal"};
+  tally found = {.what = "indefinite by 1e-10"}, convex = {.what = "definite by 1e-10"},
+        diagonal = {.what = "negative diagonal"};
   for (size_t seed = 0; seed < 10; seed++)
     for (int sign = -1; sign <= 1; sign += 2) {
       double v[N], h[N * N], square = 0, g[N], low[N], high[N];
       seed_of_test = seed;
-      for (size_t j = 0; j < N; j++) v[j] = uniform(), square += v[j] * v[j], g[j] = uniform(), low[j] = -1, high[j] = 1;
+      for (size_t j = 0; j < N; j++)
+        v[j] = uniform(), square += v[j] * v[j], g[j] = uniform(), low[j] = -1, high[j] = 1;
       for (size_t i = 0; i < N; i++)
         for (size_t j = 0; j < N; j++) h[i * N + j] = (i == j) - (1 - sign * 1e-10) * v[i] * v[j] / square;
       batten_matrix hm = batten_matrix_dense(N, N, h);
@@ -456,9 +475,16 @@ static void test_indefinite(batten_context *ctx) {
 
 static void test_semidefinite(batten_context *ctx) {
   tally t = {.what = "semidefinite, objective known"}, lp = {.what = "linear program with a known vertex"};
-  tally degenerate = {.what = "linear program with 4 n rows through the vertex"}, nothing = {.what = "no objective at all"};
+  tally degenerate = {.what = "linear program with 4 n rows through the vertex"},
+        nothing = {.what = "no objective at all"};
   for (size_t seed = 0; seed < 20; seed++) {
-    qp_scene_spec spec = {.seed = seed, .n = 12, .m = 30, .condition = 1e3, .null = 1 + seed % 11, .active = 6, .bounds = true,
+    qp_scene_spec spec = {.seed = seed,
+                          .n = 12,
+                          .m = 30,
+                          .condition = 1e3,
+                          .null = 1 + seed % 11,
+                          .active = 6,
+                          .bounds = true,
                           .lsq = seed % 2 == 0};
     qp_scene *s = qp_scene_random(&spec);
     qp_verdict v = qp_check(&s->problem, s->x, s->y);
@@ -484,7 +510,8 @@ static void test_semidefinite(batten_context *ctx) {
 
 static void test_invariance(batten_context *ctx) {
   tally columns = {.what = "unknowns in units of 2^-13 .. 2^13"}, permuted = {.what = "unknowns in another order"};
-  tally powers = {.what = "everything times powers of two"}, shifted = {.what = "objective and rows times 2^200, 2^-200"};
+  tally powers = {.what = "everything times powers of two"},
+        shifted = {.what = "objective and rows times 2^200, 2^-200"};
   for (size_t seed = 0; seed < 8; seed++) {
     enum { N = 8, M = 24 };
     qp_scene_spec spec = {.seed = seed, .n = N, .m = M, .condition = 100, .active = 5, .bounds = true};
@@ -508,7 +535,8 @@ static void test_invariance(batten_context *ctx) {
         for (size_t i = 0; i < N; i++) h[i * N + j] = all * s->h.dense[place[i] * N + place[j]] / unit[i] / unit[j];
         for (size_t i = 0; i < M; i++) rows[i * N + j] = row_unit[i] * s->c.dense[i * N + place[j]] / unit[j];
       }
-      for (size_t i = 0; i < M; i++) lower[i] = row_unit[i] * s->problem.lower[i], upper[i] = row_unit[i] * s->problem.upper[i];
+      for (size_t i = 0; i < M; i++)
+        lower[i] = row_unit[i] * s->problem.lower[i], upper[i] = row_unit[i] * s->problem.upper[i];
       batten_matrix c = batten_matrix_dense(M, N, rows), hm = batten_matrix_dense(N, N, h);
       batten_qp_problem p = batten_qp_problem_default(N);
       p.h = &hm, p.g = g, p.c = &c, p.lower = lower, p.upper = upper, p.x_lower = low, p.x_upper = high;
