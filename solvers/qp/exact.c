@@ -1,12 +1,13 @@
 /* Feasibility that is exact. See exact.h.
  *
- * A row c'x of k products that are not zero is c'x (1 + errors) however it is summed: any order is within
- * gamma_k sum|c_j x_j| of the exact value, gamma_k = k u / (1 - k u) [Higham, Accuracy and Stability, 3.1], and so is
- * the sum that we form ourselves. So slack >= twice that bound, of the x that is returned, proves the row for
- * everybody.
+ * A row c'x of k products that are not zero, added up in any order, is within gamma_k sum|c_j x_j| of its exact
+ * value, gamma_k = k u / (1 - k u) [Higham, Accuracy and Stability, 3.1]; within gamma_{k-1} of that where no product
+ * is rounded, as all c_j are powers of two. So an exact slack of that much, at the x that is returned, proves the row
+ * for everybody. Where no more than one operation rounds, it rounds monotonely, and a slack of zero will do. Slacks
+ * are found by a plain sum with its own rounding allowed for, or if that does not settle it, to twice the precision.
  *
  * Bounds of x need no sum: x is clipped to them. Rows are cured by x + e (z - x), z strictly feasible: e follows from
- * the rows that fail at x, since slack and bound are linear and convex in e. It is then verified on the rounded
+ * the rows that fail at x, since slack is linear and the bound convex in e. It is then verified on the rounded
  * result.
  *
  * A z near x is as good as a deep one: with z the projection of x on the rows moved inwards by t, |z - x| / t does
@@ -18,60 +19,101 @@
 
 #include "base/checked.h"
 
-/* A row at a point. */
-typedef struct row_value {
+static const double UNIT_ROUNDOFF = 0.5 * DBL_EPSILON;
+
+/* Entries of row i of the caller's matrix; columns NULL where it is dense. */
+static size_t row_entries(const batten_matrix *c, size_t i, const double **values, const uint32_t **columns) {
+  *columns = c->dense ? NULL : c->indices + c->starts[i];
+  *values = c->dense ? c->dense + i * c->columns : c->values + c->starts[i];
+  return c->dense ? c->columns : c->starts[i + 1] - c->starts[i];
+}
+
+/* ---- plain sums --------------------------------------------------------------------------------------------- */
+
+typedef struct plain_row {
   double sum, size; /* of c_j x_j, of |c_j x_j| */
-  size_t terms;     /* that are not zero */
-  double c, x;      /* one of them; all there is if terms = 1 */
+  size_t count;
+} plain_row;
+
+static plain_row row_plain(const batten_matrix *c, size_t i, const double *x) {
+  const double *values;
+  const uint32_t *columns;
+  size_t count = row_entries(c, i, &values, &columns), e = 0;
+  double sum[2] = {0}, size[2] = {0}; /* two of each: the loop over all rows is where the time goes */
+  for (; !columns && e + 2 <= count; e += 2) {
+    double p = values[e] * x[e], q = values[e + 1] * x[e + 1];
+    sum[0] += p, sum[1] += q;
+    size[0] += fabs(p), size[1] += fabs(q);
+  }
+  for (; e < count; e++) {
+    double p = values[e] * x[columns ? columns[e] : e];
+    sum[0] += p;
+    size[0] += fabs(p);
+  }
+  return (plain_row){sum[0] + sum[1], size[0] + size[1], count};
+}
+
+/* Twice gamma_k sum|c_j x_j| (ours, and anybody's), the rounding of that and of the slack, and underflow. */
+static double plain_rounding(const plain_row *v) {
+  double k = (double)v->count;
+  return (2 * k + 8) * UNIT_ROUNDOFF * v->size + 2 * k * DBL_TRUE_MIN;
+}
+
+static bool plain_holds(const plain_row *v, double side, double sign) {
+  return isinf(side) || sign * (v->sum - side) >= plain_rounding(v);
+}
+
+/* ---- twice the precision ------------------------------------------------------------------------------------ */
+
+typedef struct row_value {
+  double high, low; /* c'x = high + low */
+  double size;      /* sum |c_j x_j| */
+  double needed;    /* slack that proves the row */
 } row_value;
 
+static void add_exactly(row_value *v, double term) {
+  double sum = v->high + term, part = sum - v->high;
+  v->low += (v->high - (sum - part)) + (term - part);
+  v->high = sum;
+}
+
+static bool is_power_of_two(double c) {
+  int exponent;
+  return fabs(frexp(c, &exponent)) == 0.5;
+}
+
 static row_value row_at(const batten_matrix *c, size_t i, const double *x) {
+  const double *values;
+  const uint32_t *columns;
+  size_t count = row_entries(c, i, &values, &columns), terms = 0;
   row_value v = {0};
-  if (c->dense) {
-    const double *row =
-        c->dense + i * c->columns; /* two running sums: the loop over all rows is where the time goes */
-    double sum[2] = {0}, size[2] = {0};
-    size_t terms = 0, j = 0, last = 0;
-    for (; j + 2 <= c->columns; j += 2) {
-      double p = row[j] * x[j], q = row[j + 1] * x[j + 1];
-      sum[0] += p, sum[1] += q;
-      size[0] += fabs(p), size[1] += fabs(q);
-    }
-    if (j < c->columns) sum[0] += row[j] * x[j], size[0] += fabs(row[j] * x[j]);
-    for (j = 0; j < c->columns; j++) {
-      bool is_term = row[j] != 0 && x[j] != 0;
-      terms += is_term;
-      last = is_term ? j : last;
-    }
-    if (terms > 0) v = (row_value){sum[0] + sum[1], size[0] + size[1], terms, row[last], x[last]};
-    return v;
-  }
-  for (size_t e = c->starts[i]; e < c->starts[i + 1]; e++) {
-    double a = c->values[e], b = x[c->indices[e]];
+  bool rounded = false; /* some product is */
+  for (size_t e = 0; e < count; e++) {
+    double a = values[e], b = x[columns ? columns[e] : e], p = a * b;
     if (a == 0 || b == 0) continue;
-    v.sum += a * b;
-    v.size += fabs(a * b);
-    v.terms++;
-    v.c = a, v.x = b;
+    add_exactly(&v, p);
+    v.low += fma(a, b, -p);
+    v.size += fabs(p);
+    terms++;
+    rounded = rounded || !is_power_of_two(a) || fabs(p) < DBL_MIN;
   }
+  double roundings = (double)terms - (rounded ? 0 : 1);
+  if (roundings > 1) v.needed = (roundings + 2) * UNIT_ROUNDOFF * v.size;
+  if (rounded && v.size < 0x1p-900) v.needed += 2 * (double)terms * DBL_TRUE_MIN; /* fma() may have lost a part */
   return v;
 }
 
-/* Twice the rounding of k products and their sum, the rounding of this bound and of a slack, and underflow. */
-static double rounding(const row_value *v) {
-  return ((double)v->terms + 4) * DBL_EPSILON * v->size + 2 * (double)v->terms * DBL_TRUE_MIN;
+static double slack_of(const row_value *v, double side, double sign) {
+  row_value w = *v;
+  add_exactly(&w, -side);
+  return sign * (w.high + w.low);
 }
 
-/* Whether sum >= side (sign 1) or <= side (sign -1), proven. No term: the sum is 0. One: its rounding is monotone, so
- * only the exact product counts, whose difference from the side a fused multiply-add rounds without changing its sign
- * (unless it underflows, so tiny sides take the general way). */
 static bool side_holds(const row_value *v, double side, double sign) {
-  if (isinf(side)) return true;
-  if (v->terms == 0) return sign * side <= 0;
-  if (v->terms == 1 && side == 0) return sign * copysign(1, v->c) * copysign(1, v->x) > 0;
-  if (v->terms == 1 && fabs(side) > 0x1p-900) return sign * fma(v->c, v->x, -side) >= 0;
-  return sign * (v->sum - side) >= rounding(v);
+  return isinf(side) || slack_of(v, side, sign) >= v->needed;
 }
+
+/* ---- all rows ----------------------------------------------------------------------------------------------- */
 
 /* What exactness is asked of: everything but equalities. */
 typedef struct asked {
@@ -82,17 +124,18 @@ typedef struct asked {
 static double lower_of(const asked *a, size_t i) { return a->problem->lower ? a->problem->lower[i] : -INFINITY; }
 static double upper_of(const asked *a, size_t i) { return a->problem->upper ? a->problem->upper[i] : INFINITY; }
 
-static bool row_holds(const asked *a, size_t i, const row_value *v) {
+static bool row_holds(const asked *a, size_t i, const double *x) {
   double lower = lower_of(a, i), upper = upper_of(a, i);
-  return lower == upper || (side_holds(v, lower, 1) && side_holds(v, upper, -1));
+  if (lower == upper) return true;
+  plain_row plain = row_plain(a->problem->c, i, x);
+  if (plain_holds(&plain, lower, 1) && plain_holds(&plain, upper, -1)) return true;
+  row_value v = row_at(a->problem->c, i, x);
+  return side_holds(&v, lower, 1) && side_holds(&v, upper, -1);
 }
 
 /* First row from `from` on that is not proven at x, or m. */
 static size_t next_failing(const asked *a, size_t from, const double *x) {
-  for (; from < a->m; from++) {
-    row_value v = row_at(a->problem->c, from, x);
-    if (!row_holds(a, from, &v)) break;
-  }
+  while (from < a->m && row_holds(a, from, x)) from++;
   return from;
 }
 
@@ -102,7 +145,7 @@ static size_t next_unequal(const asked *a, const double *z) {
   size_t i = 0;
   for (; i < a->m; i++) {
     if (lower_of(a, i) != upper_of(a, i)) continue;
-    row_value v = row_at(a->problem->c, i, z);
+    plain_row v = row_plain(a->problem->c, i, z);
     if (!(fabs(v.sum - lower_of(a, i)) <= PART * fmax(v.size, fabs(lower_of(a, i))))) break;
   }
   return i;
@@ -121,18 +164,19 @@ static void blend_to(const batten_qp_problem *p, const double *x, const double *
   clip(p, out);
 }
 
-/* Smallest e for one side of a failing row: slack less bound, linear between its values at x and z. The bound gets
- * what rounding of the blended point adds. */
+/* Smallest e for one side of a failing row: slack less what is needed, linear between its values at x and z. Rounding
+ * of the blended point takes a little more; seldom as much as allowed here. */
 static double side_fraction(const row_value *at_x, const row_value *at_z, double side, double sign) {
+  const double BLENDED = UNIT_ROUNDOFF;
   if (isinf(side)) return 0;
-  double short_of = 2 * DBL_EPSILON * at_x->size + rounding(at_x) - sign * (at_x->sum - side);
-  double beyond = sign * (at_z->sum - side) - rounding(at_z) - 2 * DBL_EPSILON * at_z->size;
+  double short_of = at_x->needed + BLENDED * at_x->size - slack_of(at_x, side, sign);
+  double beyond = slack_of(at_z, side, sign) - at_z->needed - BLENDED * at_z->size;
   if (!(short_of > 0)) return 0;
   return beyond > 0 ? short_of / (short_of + beyond) : 1;
 }
 
-/* The smallest e, up to a small factor, at which the blend of x and z is proven, and the blend itself in out; z is.
- */
+/* The smallest e, up to a small factor, at which the blend of x and z is proven, and the blend itself in out. z is
+ * proven. */
 static double smallest_blend(const asked *a, const double *x, const double *z, double *out) {
   const double MORE = 1.25; /* what is left to verify is rounding in e itself: once is nearly always enough */
   double e = 0;
@@ -308,7 +352,7 @@ static batten_status take_interior(batten_context *ctx, const asked *a, const do
   return batten_fail(ctx, BATTEN_W_ACCURACY,
                      "options.interior: row %zu is %g there, not strictly within [%g, %g]; give a strictly feasible "
                      "point, or NULL to have one found",
-                     bad, row_at(a->problem->c, bad, z).sum, lower_of(a, bad), upper_of(a, bad));
+                     bad, row_plain(a->problem->c, bad, z).sum, lower_of(a, bad), upper_of(a, bad));
 }
 
 static bool is_interior(const asked *a, const double *x0, double *z) {
