@@ -57,6 +57,7 @@ typedef struct line {
 } line;
 
 static line line_of(const batten_matrix *m, size_t i) {
+  if (m->columns == 0) return (line){0, NULL, NULL}; /* may come without arrays */
   if (m->dense) return (line){m->columns, m->dense + i * m->columns, NULL};
   return (line){m->starts[i + 1] - m->starts[i], m->values + m->starts[i], m->indices + m->starts[i]};
 }

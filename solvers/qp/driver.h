@@ -18,17 +18,21 @@ typedef struct qp_task {
   const qp_objective *objective;
   const qp_rows *rows;
   qp_limits limits;
+  double least_rho;      /* that rho must have: 0 at first, more where an engine got stuck */
   double rho;            /* of the factor that the dense engines work with; 0 = strictly convex as it is */
   double *r, *base;      /* that factor, [n][n] and [n]; NULL until it is needed */
   size_t proximal_steps; /* added to */
   size_t not_convex_index;
+  double factor_s; /* time that the factor took */
 } qp_task;
 
 /* proximal.c: PRIMAL or DUAL to the end, by a proximal loop where the objective is not strictly convex. Status as of
  * the engines, and E_NOT_CONVEX with point->ray. */
 batten_status qp_dense_solve(batten_context *ctx, qp_task *task, batten_qp_engine engine, qp_point *point);
 /* Makes task->r for the least rho that it takes, or once more with a larger one. */
-batten_status qp_dense_factor(batten_context *ctx, qp_task *task, double least_rho, double *ray);
+batten_status qp_dense_factor(batten_context *ctx, qp_task *task, double *ray);
+/* Asks for a larger rho; false when it is as large as makes sense. */
+bool qp_dense_damp(qp_task *task);
 void qp_task_free(batten_context *ctx, qp_task *task);
 
 /* refine.c: the minimiser on the working set point->active alone, by steps of conjugate gradients on the factor, with

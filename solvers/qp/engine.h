@@ -100,5 +100,7 @@ batten_status qp_interior_cost(batten_context *ctx, const batten_matrix *h, cons
 /* The workspace's inside: a context that keeps freed blocks for the next solve. Progress, threads and limits are those
  * of the outer context. */
 batten_context *qp_context(batten_qp_workspace *workspace);
+/* The caller's context that it was made with. */
+batten_context *qp_outer_context(batten_qp_workspace *workspace);
 
 #endif

@@ -11,6 +11,7 @@ typedef struct qp_matrix_row {
 } qp_matrix_row;
 
 static inline qp_matrix_row qp_row_of(const batten_matrix *m, size_t i) {
+  if (m->columns == 0) return (qp_matrix_row){0, NULL, NULL}; /* may come without arrays */
   if (m->dense) return (qp_matrix_row){m->columns, m->dense + i * m->columns, NULL};
   return (qp_matrix_row){m->starts[i + 1] - m->starts[i], m->values + m->starts[i], m->indices + m->starts[i]};
 }

@@ -31,6 +31,7 @@ typedef struct presolver {
   size_t *heads, cells; /* [cells] first constraint of each cell of the hash table, NONE = empty */
   size_t *next;         /* [m] next constraint in the same cell */
   uint64_t *key;        /* [m] cell of constraint k before hashing */
+  double slack; /* how far the caller lets a row or bound be violated */
   double *certificate;
 } presolver;
 
@@ -132,12 +133,13 @@ static batten_status conflict(const presolver *s, size_t lower, double lower_fac
                      one, other, by);
 }
 
-/* Sides that cross by rounding are made equal; beyond it, no x satisfies them. */
+/* Sides that cross by rounding, or by less than the caller minds, are made equal; beyond it, no x satisfies them. */
 static batten_status meet(const presolver *s, double *lower, double *upper, size_t lower_from, double lower_factor,
                           size_t upper_from, double upper_factor) {
   if (*lower <= *upper) return BATTEN_OK;
   double by = *lower - *upper;
-  if (by > crossing(s->n) * (fabs(*lower) + fabs(*upper)))
+  double minded = s->slack * fmin(fabs(lower_factor), fabs(upper_factor));
+  if (by > crossing(s->n) * (fabs(*lower) + fabs(*upper)) && by > minded)
     return conflict(s, lower_from, lower_factor, upper_from, upper_factor, by);
   *lower = *upper = *upper + 0.5 * by;
   return BATTEN_OK;
@@ -147,7 +149,7 @@ static batten_status meet(const presolver *s, double *lower, double *upper, size
 
 static batten_status zero_row(const presolver *s, size_t i) {
   double lower = lower_of(s->problem, i), upper = upper_of(s->problem, i);
-  if (lower <= 0 && upper >= 0) return BATTEN_OK;
+  if (lower <= s->slack && upper >= -s->slack) return BATTEN_OK;
   prove(s, i, lower > 0 ? 1 : -1);
   return batten_fail(s->ctx, BATTEN_E_INFEASIBLE, "row %zu of c: zeros, but sides [%g, %g]; remove or relax it", i,
                      lower, upper);
@@ -297,8 +299,9 @@ static batten_status judge_by_bounds(presolver *s, size_t k) {
   double error = (double)(s->n + 2) * DBL_EPSILON * size;
   double low = (least - error) * scale, high = (most + error) * scale;
   double beyond = crossing(s->n) * (fabs(size) * scale);
-  bool above = high < o->lower[k] - (beyond + crossing(s->n) * fabs(o->lower[k]));
-  bool below = low > o->upper[k] + (beyond + crossing(s->n) * fabs(o->upper[k]));
+  double minded = s->slack * scale;
+  bool above = high < o->lower[k] - fmax(beyond + crossing(s->n) * fabs(o->lower[k]), minded);
+  bool below = low > o->upper[k] + fmax(beyond + crossing(s->n) * fabs(o->upper[k]), minded);
   if (above || below) {
     size_t from = above ? o->lower_from[k] : o->upper_from[k];
     prove(s, from, above ? o->lower_factor[k] : -o->upper_factor[k]);
@@ -306,6 +309,9 @@ static batten_status judge_by_bounds(presolver *s, size_t k) {
                        "row %zu of c: within the bounds of x it is in [%g, %g], which its sides exclude; relax one",
                        from, least, most);
   }
+  /* what is missing by less is not missed */
+  o->lower[k] = fmin(o->lower[k], high);
+  o->upper[k] = fmax(o->upper[k], low);
   bool low_implied = low >= o->lower[k], high_implied = high <= o->upper[k];
   if (o->lower[k] == o->upper[k] && !(low_implied && high_implied)) return BATTEN_OK;
   if (low_implied) o->lower[k] = -INFINITY, o->lower_from[k] = NONE;
@@ -409,9 +415,11 @@ static batten_status take_scratch(presolver *s) {
   return BATTEN_OK;
 }
 
-batten_status qp_presolve_new(batten_context *ctx, const batten_qp_problem *problem, qp_presolve *out,
+batten_status qp_presolve_new(batten_context *ctx, const batten_qp_problem *problem, double slack, qp_presolve *out,
                               double *certificate) {
-  presolver s = {.ctx = ctx, .problem = problem, .out = out, .n = problem->n, .certificate = certificate};
+  presolver s = {.ctx = ctx, .problem = problem, .out = out, .n = problem->n};
+  s.slack = slack;
+  s.certificate = certificate;
   s.m = problem->c ? problem->c->rows : 0;
   *out = (qp_presolve){.problem = problem};
   for (size_t i = 0; certificate && i < s.m + s.n; i++) certificate[i] = 0;

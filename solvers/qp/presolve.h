@@ -17,9 +17,9 @@ typedef struct qp_presolve {
 } qp_presolve;
 
 /* problem has been checked. Leaves out rows without finite sides, zero rows, rows implied by the bounds; merges parallel
- * ones. E_INFEASIBLE when two sides cross beyond rounding or a zero row cannot hold: certificate [m + n] is then the
- * proposed proof. Free with qp_presolve_free, also after a failure. Time O(entries + m log m). */
-batten_status qp_presolve_new(batten_context *ctx, const batten_qp_problem *problem, qp_presolve *out,
+ * ones. E_INFEASIBLE when two sides cross beyond rounding and by more than slack (in the caller's units: what is as good
+ * as feasible to him), or a zero row cannot hold: certificate [m + n] is then the proposed proof. Free with qp_presolve_free, also after a failure. Time O(entries + m log m). */
+batten_status qp_presolve_new(batten_context *ctx, const batten_qp_problem *problem, double slack, qp_presolve *out,
                               double *certificate);
 void qp_presolve_free(batten_context *ctx, qp_presolve *p);
 

@@ -25,16 +25,26 @@ static void drop_free_blocks(batten_qp_workspace *w) {
   }
 }
 
-/* A kept block serves a request of up to its size, if it wastes less than half. */
+/* Sizes come in classes, four to eight to an octave, from 8 pages up in pages. A kept block serves requests of its own class alone:
+ * were it lent to smaller ones, the same solve done again could find it taken where it was free before. */
+static bool class_of(size_t bytes, size_t *size) {
+  const size_t PAGE = 4096;
+  size_t step = HEADER;
+  while (step < PAGE && 8 * step <= bytes) step *= 2;
+  if (!batten_add(bytes, step - 1, size)) return false;
+  *size -= *size % step;
+  return true;
+}
+
 static void *cache_allocate(void *user, size_t bytes) {
   batten_qp_workspace *w = user;
-  block **best = NULL;
-  for (block **b = &w->free_blocks; *b; b = &(*b)->next)
-    if ((*b)->bytes >= bytes && (*b)->bytes / 2 <= bytes && (!best || (*b)->bytes < (*best)->bytes)) best = b;
+  if (!class_of(bytes, &bytes)) return NULL;
+  block **kept = &w->free_blocks;
+  while (*kept && (*kept)->bytes != bytes) kept = &(*kept)->next;
   block *taken;
-  if (best) {
-    taken = *best;
-    *best = taken->next;
+  if (*kept) {
+    taken = *kept;
+    *kept = taken->next;
   } else {
     size_t all;
     if (!batten_add(bytes, HEADER, &all)) return NULL;
@@ -91,3 +101,4 @@ void batten_qp_workspace_free(batten_qp_workspace *workspace) {
 }
 
 batten_context *qp_context(batten_qp_workspace *workspace) { return workspace->inner; }
+batten_context *qp_outer_context(batten_qp_workspace *workspace) { return workspace->outer; }

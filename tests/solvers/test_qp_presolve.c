@@ -23,7 +23,7 @@ static void test_by_hand(batten_context *ctx) {
   p.c = &rows, p.lower = lower, p.upper = upper, p.x_lower = x_lower, p.x_upper = x_upper;
   qp_presolve s;
   double certificate[10];
-  T_OK(qp_presolve_new(ctx, &p, &s, certificate), ctx);
+  T_OK(qp_presolve_new(ctx, &p, 0, &s, certificate), ctx);
   const qp_rows *r = &s.rows;
   T_CHECK(r->m == 4 && r->row[0] == 0 && r->row[1] == 7 && r->row[2] == 8 && r->row[3] == 9, "%zu constraints", r->m);
   T_CHECK(fabs(r->scale[0] - 0.2) < 1e-16 && r->lower[0] == -1 && fabs(r->upper[0] - 2) < 1e-15,
@@ -71,7 +71,7 @@ static void refuse(batten_context *ctx, const char *text, size_t m, size_t n, co
   p.c = &rows, p.lower = lower, p.upper = upper, p.x_lower = x_lower, p.x_upper = x_upper;
   qp_presolve s;
   double y[16], work[16], sum = 0;
-  T_STATUS(qp_presolve_new(ctx, &p, &s, y), BATTEN_E_INFEASIBLE, ctx, text);
+  T_STATUS(qp_presolve_new(ctx, &p, 0, &s, y), BATTEN_E_INFEASIBLE, ctx, text);
   qp_presolve_free(ctx, &s);
   T_CHECK(qp_certify_infeasible(&p, y, work), "the judge accepts the proof");
   for (size_t i = 0; i < m + n; i++) {
@@ -110,7 +110,7 @@ static void test_rounding(batten_context *ctx) {
   batten_qp_problem p = (batten_qp_problem){.struct_size = sizeof p, .n = 2};
   p.c = &rows, p.lower = lower, p.upper = upper, p.x_lower = x_lower, p.x_upper = x_upper;
   qp_presolve s;
-  T_OK(qp_presolve_new(ctx, &p, &s, NULL), ctx);
+  T_OK(qp_presolve_new(ctx, &p, 0, &s, NULL), ctx);
   T_CHECK(s.rows.m == 3 && qp_rows_is_equality(&s.rows, 0) && qp_rows_is_equality(&s.rows, 1),
           "sides are made equal");
   double y[3] = {1, -1, 0}, back[5];
@@ -157,7 +157,7 @@ static void test_many(batten_context *ctx, size_t m, size_t originals, size_t n,
   p.c = &rows, p.lower = lower, p.upper = upper;
   qp_presolve s;
   double before = batten_now();
-  batten_status st = qp_presolve_new(ctx, &p, &s, NULL);
+  batten_status st = qp_presolve_new(ctx, &p, 0, &s, NULL);
   double time = batten_now() - before, worst = 0, length = 0, *x = malloc(n * sizeof *x);
   T_CHECK(st == BATTEN_OK && s.rows.m == originals, "%zu %s rows of %zu: %zu constraints, %.2g ms", m,
           sparse ? "sparse" : "dense", originals, s.rows.m, 1e3 * time);
@@ -187,7 +187,7 @@ static void test_range(batten_context *ctx) {
   batten_qp_problem p = (batten_qp_problem){.struct_size = sizeof p, .n = 2};
   p.c = &rows, p.lower = lower, p.upper = upper;
   qp_presolve s;
-  T_OK(qp_presolve_new(ctx, &p, &s, NULL), ctx);
+  T_OK(qp_presolve_new(ctx, &p, 0, &s, NULL), ctx);
   bool finite = true;
   for (size_t k = 0; k < s.rows.m; k++) finite = finite && s.scale[k] > 0 && isfinite(s.scale[k]);
   T_CHECK(finite && s.rows.m >= 3, "%zu constraints, scales in range", s.rows.m);
@@ -195,14 +195,14 @@ static void test_range(batten_context *ctx) {
   qp_presolve_free(ctx, &s);
 
   batten_qp_problem none = {.struct_size = sizeof none};
-  T_OK(qp_presolve_new(ctx, &none, &s, NULL), ctx);
+  T_OK(qp_presolve_new(ctx, &none, 0, &s, NULL), ctx);
   T_CHECK(s.rows.m == 0, "nothing gives nothing");
   qp_presolve_free(ctx, &s);
 }
 
 static batten_status with_memory(batten_context *ctx, void *arg) {
   qp_presolve s;
-  batten_status st = qp_presolve_new(ctx, arg, &s, NULL);
+  batten_status st = qp_presolve_new(ctx, arg, 0, &s, NULL);
   qp_presolve_free(ctx, &s);
   return st;
 }
