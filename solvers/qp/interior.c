@@ -280,6 +280,8 @@ static batten_status ip_new(batten_context *ctx, const qp_scaled *s, ip *p) {
   for (size_t v = 0; v < VECTORS_N; v++, at += n) *of_n[v] = at;
   for (size_t v = 0; v < VECTORS_M; v++, at += m) *of_m[v] = at;
   p->kept_rows = at;
+  w->sum = batten_alloc_array(ctx, n, sizeof *w->sum);
+  if (!w->sum) return BATTEN_E_NOMEM;
   p->kind = batten_alloc_array(ctx, m, 2);
   if (!p->kind) return BATTEN_E_NOMEM;
   w->tried = (signed char *)p->kind + m;
@@ -290,6 +292,7 @@ static batten_status ip_new(batten_context *ctx, const qp_scaled *s, ip *p) {
 static void ip_free(batten_context *ctx, ip *p) {
   ip_newton_free(ctx, &p->newton);
   batten_free(ctx, p->kind);
+  batten_free(ctx, p->work.sum);
   batten_free(ctx, p->x);
 }
 
@@ -484,7 +487,7 @@ batten_status qp_interior_cost(batten_context *ctx, const batten_matrix *h, cons
   if (st < 0) goto done;
   st = qp_kkt_new(ctx, &s.h, &s.c, &kkt);
   if (st < 0) goto done;
-  size_t vectors = (VECTORS_N + 4) * s.n + (VECTORS_M + KEPT_M + 4) * s.m + (2 * IP_KRYLOV + 1) * (s.n + s.m);
+  size_t vectors = (VECTORS_N + 6) * s.n + (VECTORS_M + KEPT_M + 4) * s.m + (2 * IP_KRYLOV + 1) * (s.n + s.m);
   size_t entries = s.h.starts[s.n] + s.c.starts[s.general] + s.n + s.m;
   out->bytes = s.bytes + kkt.bytes + vectors * sizeof(double) + 2 * s.m;
   out->flops = STEPS * (kkt.flops + FLOPS_OF_STEP_PER_ENTRY * (double)entries);

@@ -5,6 +5,7 @@
 
 #include "kkt.h"
 #include "scaled.h"
+#include "twice.h"
 
 /* Of each row, which sides it has. */
 enum { IP_EQUAL = 0, IP_LOWER = 1, IP_UPPER = 2, IP_BOTH = 3 };
@@ -45,6 +46,7 @@ ip_figures ip_judge(const qp_scaled *s, const double *x, const double *y, double
  * figures of what is then there. x, y scaled. */
 typedef struct ip_polish_work {
   double *x, *y, *dx, *dy, *r1, *r2; /* [n] or [m] */
+  qp_twice *sum;                     /* [n] */
   signed char *tried;
 } ip_polish_work;
 ip_figures ip_polish(ip_newton *k, ip_polish_work *work, ip_figures before, double enough, double *x, double *y,

@@ -7,21 +7,34 @@
 
 static const double NEVER = 1e30; /* w of rows that are not active: as good as no row */
 
-/* Residuals of the problem with the active rows as equations; returns their size. */
-static double residuals(const qp_scaled *s, const ip_polish_work *p, double *scratch) {
+/* Residuals of the problem with the active rows as equations, in twice the working precision, without which they
+ * would be rounding long before x and y are. Returns their size. */
+static double residuals(const qp_scaled *s, const ip_polish_work *p) {
   double size = 0;
-  qp_scaled_hessian(s, p->x, p->r1);
-  for (size_t j = 0; j < s->n; j++) p->r1[j] += s->g[j];
-  qp_scaled_add(s, -1, p->y, p->r1);
   for (size_t j = 0; j < s->n; j++) {
-    p->r1[j] = -p->r1[j];
-    size = fmax(size, fabs(p->r1[j]));
+    p->sum[j] = (qp_twice){-s->g[j], 0};
+    for (size_t e = s->h.starts[j]; e < s->h.starts[j + 1]; e++)
+      qp_twice_add_product(&p->sum[j], -s->h.values[e], p->x[s->h.indices[e]]);
   }
-  qp_scaled_rows(s, p->x, scratch);
   for (size_t k = 0; k < s->m; k++) {
-    double side = p->tried[k] == QP_UPPER ? s->upper[k] : s->lower[k];
-    p->r2[k] = p->tried[k] ? side - scratch[k] : 0;
+    qp_twice left = {p->tried[k] == QP_UPPER ? s->upper[k] : s->lower[k], 0};
+    p->r2[k] = 0;
+    if (!p->tried[k]) continue;
+    if (k < s->general) {
+      for (size_t e = s->c.starts[k]; e < s->c.starts[k + 1]; e++) {
+        qp_twice_add_product(&left, -s->c.values[e], p->x[s->c.indices[e]]);
+        qp_twice_add_product(&p->sum[s->c.indices[e]], s->c.values[e], p->y[k]);
+      }
+    } else {
+      qp_twice_add(&left, -p->x[s->column[k - s->general]]);
+      qp_twice_add(&p->sum[s->column[k - s->general]], p->y[k]);
+    }
+    p->r2[k] = qp_twice_value(left);
     size = fmax(size, fabs(p->r2[k]));
+  }
+  for (size_t j = 0; j < s->n; j++) {
+    p->r1[j] = qp_twice_value(p->sum[j]);
+    size = fmax(size, fabs(p->r1[j]));
   }
   return size;
 }
@@ -35,7 +48,7 @@ static void solve(ip_newton *k, ip_polish_work *p) {
   for (size_t i = 0; i < s->m; i++) k->w[i] = p->tried[i] ? REGULARIZATION : NEVER;
   ip_newton_factor(k, 0, 0);
   for (int round = 0; round < ROUNDS; round++) {
-    double size = residuals(s, p, k->q2);
+    double size = residuals(s, p);
     if (!(size < 0.5 * before)) break;
     before = size;
     ip_newton_solve(k, p->r1, p->r2, p->dx, p->dy);
