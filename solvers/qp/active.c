@@ -9,6 +9,8 @@
 #include "base/checked.h"
 #include "la/la.h"
 
+static const size_t WORTH_BLAS = 96;
+
 /* Four running sums, so that the order of additions is fixed and the loop fills vector registers. */
 static double dot(size_t n, const double *a, const double *b) {
   double s[4] = {0};
@@ -89,7 +91,10 @@ void qp_active_reset(qp_active *set, const double *c) {
 /* ---- Products ---- */
 
 void qp_active_project_vector(const qp_active *set, const double *v, double *d) {
-  for (size_t j = 0; j < set->n; j++) d[j] = dot(set->n, set->j + j * set->n, v);
+  if (set->n < WORTH_BLAS)
+    for (size_t j = 0; j < set->n; j++) d[j] = dot(set->n, set->j + j * set->n, v);
+  else
+    batten_la_gemv(BATTEN_LA_DOUBLE, 'T', set->n, set->n, 1, set->j, set->n, v, 0, d);
 }
 
 void qp_active_project(const qp_active *set, size_t k, double *d) {
@@ -97,19 +102,24 @@ void qp_active_project(const qp_active *set, size_t k, double *d) {
   const uint32_t *columns;
   size_t n = set->n, count = qp_rows_entries(set->rows, k, &values, &columns);
   double scale = set->rows->scale[k];
+  if (!columns) {
+    qp_active_project_vector(set, values, d);
+    for (size_t j = 0; j < n; j++) d[j] *= scale;
+    return;
+  }
   for (size_t j = 0; j < n; j++) {
-    const double *column = set->j + j * n;
     double sum = 0;
-    if (columns)
-      for (size_t e = 0; e < count; e++) sum += column[columns[e]] * values[e];
-    else
-      sum = dot(n, column, values);
+    for (size_t e = 0; e < count; e++) sum += set->j[columns[e] + j * n] * values[e];
     d[j] = scale * sum;
   }
 }
 
 void qp_active_combine(const qp_active *set, size_t first, size_t last, double factor, const double *u, double *x) {
-  for (size_t j = first; j < last; j++) axpy(set->n, factor * u[j], set->j + j * set->n, x);
+  if (set->n < WORTH_BLAS)
+    for (size_t j = first; j < last; j++) axpy(set->n, factor * u[j], set->j + j * set->n, x);
+  else
+    batten_la_gemv(BATTEN_LA_DOUBLE, 'N', set->n, last - first, factor, set->j + first * set->n, set->n, u + first, 1,
+                   x);
 }
 
 void qp_active_solve(const qp_active *set, const double *d, double *y) {

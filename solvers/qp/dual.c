@@ -267,7 +267,7 @@ static batten_status pivot_candidates(dual *s, size_t most, size_t *pivots) {
     qp_pricing_violation(&s->pricing, k, s->pricing.product[place], s->x, &side);
     batten_status st = pivot(s, k, side, &given_up);
     if (st < 0) return st;
-    s->pricing.skip[place] = given_up;
+    if (given_up) qp_pricing_skip(&s->pricing, place);
     *pivots += !given_up;
     double done = (double)s->point->iterations;
     st = qp_limits_check(s->ctx, s->limits, s->point->iterations, done / (done + (double)s->set.n));

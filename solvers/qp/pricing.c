@@ -11,6 +11,11 @@
 
 enum { CANDIDATES = 128 };
 
+/* A pass is over when the farthest candidate is below this share of the first one's distance: rows that are no
+ * candidates are then likely to be farther. The dearer a pass is beside a pivot (m / n), the longer its candidates
+ * are used: to the end for very many rows. */
+static double last_share(const qp_rows *rows) { return fmin(0.25, 5 * (double)rows->n / (double)rows->m); }
+
 /* Two times the worst error of a product of four terms or less, far below that of long rows, where errors seldom add
  * up. */
 static const double FEASIBILITY = 8 * DBL_EPSILON;
@@ -173,6 +178,7 @@ static void gather(qp_pricing *p) {
     count = most;
   }
   p->count = count;
+  p->first = 0;
   memset(p->copy, 0, count * n * sizeof *p->copy);
   for (size_t i = 0; i < count; i++) {
     p->candidate[i] = p->offer[i];
@@ -228,5 +234,7 @@ size_t qp_pricing_worst(qp_pricing *p, const double *x) {
       worst = i;
     }
   }
+  if (most < last_share(rows) * p->first) return SIZE_MAX;
+  p->first = fmax(p->first, most);
   return worst;
 }

@@ -26,6 +26,7 @@ typedef struct qp_pricing {
   double *weight;    /* [most] 1 / |R^-T a_k|: takes violations into the objective's metric */
   double *work;      /* [most][n] */
   double *product;   /* [most] a_k'x */
+  double first;      /* distance of the farthest one met in this pass */
   bool *skip;        /* [most] given up until the next pass */
 } qp_pricing;
 
@@ -39,8 +40,15 @@ size_t qp_pricing_bytes(const qp_rows *rows);
 bool qp_pricing_pass(batten_context *ctx, qp_pricing *p, const double *x);
 
 /* The candidate whose side is farthest from x in the objective's metric, where a step to it raises the objective most
- * (by half the square of the distance, as far as no member is in the way): its place, or SIZE_MAX. */
+ * (by half the square of the distance, as far as no member is in the way): its place, or SIZE_MAX when it is time for
+ * the next pass. */
 size_t qp_pricing_worst(qp_pricing *p, const double *x);
+
+/* Gives the candidate at a place up until the next pass. */
+static inline void qp_pricing_skip(qp_pricing *p, size_t place) {
+  p->skip[place] = true;
+  p->first = 0; /* no measure for the others */
+}
 
 /* By how much a_k'x = product misses its sides beyond rounding, else 0; *side the side missed. */
 double qp_pricing_violation(const qp_pricing *p, size_t k, double product, const double *x, signed char *side);
