@@ -263,7 +263,26 @@ static batten_status refactor(qp_search *s) {
   return st;
 }
 
+/* Multipliers from what is left of the gradient at x, R'(Rx - c) - sum y_k a_k: on members, by one step of iterative
+ * refinement. */
+static void refine_multipliers(qp_search *s) {
+  size_t n = s->n;
+  const double *r = s->objective->r, *x = s->have_safe ? s->safe : s->x;
+  for (size_t i = 0; i < n; i++) s->work[i] = -s->objective->target[i];
+  for (size_t j = 0; j < n; j++)
+    for (size_t i = 0; i <= j; i++) s->work[i] += r[i + j * n] * x[j];
+  for (size_t j = 0; j < n; j++) {
+    s->f[j] = 0;
+    for (size_t i = 0; i <= j; i++) s->f[j] += r[i + j * n] * s->work[i];
+  }
+  for (size_t i = 0; i < s->set.q; i++) qp_rows_add(s->rows, s->set.member[i], -s->y[i], s->f);
+  qp_active_project_vector(&s->set, s->f, s->d);
+  qp_active_solve(&s->set, s->d, s->d);
+  for (size_t i = 0; i < s->set.q; i++) s->y[i] += s->d[i];
+}
+
 static void write_result(qp_search *s, bool optimal) {
+  if (optimal) refine_multipliers(s);
   qp_point *point = s->point;
   point->have_x = s->have_safe;
   memcpy(point->x, s->have_safe ? s->safe : s->x, s->n * sizeof *point->x);
