@@ -105,11 +105,6 @@ static batten_status descend(qp_search *s) {
 
 /* ---- Survey of all rows ---- */
 
-typedef struct finding {
-  size_t place;
-  double most;
-} finding;
-
 /* How far a value is outside of its row's sides, beyond rounding; size is that of s->most. */
 static double outside(const qp_search *s, size_t k, double value, double size) {
   double lower = s->rows->lower[k], upper = s->rows->upper[k], side = value < lower ? lower : upper;
@@ -126,7 +121,10 @@ static bool survey(qp_search *s) {
   size_t m = s->m, before = s->sighted, stops = m;
   size_t stretch = m / 64 < 32 ? 32 : m / 64 > 1024 ? 1024 : m / 64;
   double alpha = 1, size = 0;
-  for (size_t j = 0; j < s->n; j++) size += s->most[j] * s->most[j];
+  for (size_t j = 0; j < s->n; j++) {
+    s->most[j] = fmax(s->most[j], fabs(s->x[j]));
+    size += s->most[j] * s->most[j];
+  }
   size = sqrt(size);
   bool all_hold = true;
   for (size_t first = 0; first < m; first += stretch) {
