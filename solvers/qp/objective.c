@@ -88,17 +88,19 @@ double qp_objective_value(const qp_objective *o, const double *x) {
 
 /* ---- Metric ---- */
 
-/* largest [n] := the largest |W^1/2 A| of each column. */
-static void largest_of_columns(const qp_objective *o, double *largest) {
-  memset(largest, 0, o->n * sizeof *largest);
+/* unit [n] := the power of two that brings the largest |W^1/2 A| of each column to about 1. */
+static void units_of_columns(const qp_objective *o, double *unit) {
+  memset(unit, 0, o->n * sizeof *unit);
   for (size_t i = 0; i < o->k; i++) {
     qp_matrix_row row = qp_row_of(o->problem->a, i);
     double w = sqrt(weight_of(o->problem, i));
     for (size_t e = 0; e < row.count; e++) {
       size_t j = qp_row_column(&row, e);
-      largest[j] = fmax(largest[j], w * fabs(row.values[e]));
+      double size = w * fabs(row.values[e]);
+      unit[j] = size > unit[j] ? size : unit[j];
     }
   }
+  for (size_t j = 0; j < o->n; j++) unit[j] = unit[j] > 0 ? batten_unit(fmin(unit[j], DBL_MAX)) : 1;
 }
 
 static double diagonal_of(const batten_matrix *h, size_t j) {
@@ -110,23 +112,23 @@ static double diagonal_of(const batten_matrix *h, size_t j) {
 }
 
 /* Unknowns without curvature of their own are moved like the stiffest ones. Sizes stay where squares are in range. */
-static void set_metric(const qp_objective *o, double *largest) {
+static void set_metric(const qp_objective *o, double *unit) {
   const double RANGE = 0x1p500;
-  largest_of_columns(o, largest);
+  units_of_columns(o, unit);
   memset(o->metric, 0, o->n * sizeof *o->metric);
   for (size_t i = 0; i < o->k; i++) {
     qp_matrix_row row = qp_row_of(o->problem->a, i);
     double w = sqrt(weight_of(o->problem, i));
     for (size_t e = 0; e < row.count; e++) {
       size_t j = qp_row_column(&row, e);
-      double part = largest[j] > 0 ? w * row.values[e] / largest[j] : 0;
+      double part = w * row.values[e] * unit[j];
       o->metric[j] += part * part;
     }
   }
   double stiffest = 0;
   for (size_t j = 0; j < o->n; j++) {
     double h = o->problem->h ? diagonal_of(o->problem->h, j) : 0;
-    o->metric[j] = hypot(largest[j] * sqrt(o->metric[j]), sqrt(fmax(h, 0)));
+    o->metric[j] = hypot(sqrt(o->metric[j]) / unit[j], sqrt(fmax(h, 0)));
     if (o->metric[j] > 0) o->metric[j] = 1 / batten_unit(fmin(fmax(o->metric[j], 1 / RANGE), RANGE));
     stiffest = fmax(stiffest, o->metric[j]);
   }
@@ -138,7 +140,7 @@ batten_status qp_objective_new(batten_context *ctx, const batten_qp_problem *pro
   size_t n = problem->n, k = problem->a ? problem->a->rows : 0;
   *out = (qp_objective){.problem = problem, .n = n, .k = k};
   batten_status st = BATTEN_E_NOMEM;
-  double *largest = NULL;
+  double *unit = NULL;
   out->state = batten_alloc(ctx, sizeof *out->state);
   if (!out->state) goto done;
   *out->state = (struct qp_objective_state){.convex = problem->h == NULL};
@@ -146,12 +148,12 @@ batten_status qp_objective_new(batten_context *ctx, const batten_qp_problem *pro
   if (!out->metric) goto done;
   out->residual = batten_alloc_array(ctx, k, sizeof *out->residual);
   if (!out->residual) goto done;
-  largest = batten_alloc_array(ctx, n, sizeof *largest);
-  if (!largest) goto done;
-  set_metric(out, largest);
+  unit = batten_alloc_array(ctx, n, sizeof *unit);
+  if (!unit) goto done;
+  set_metric(out, unit);
   st = BATTEN_OK;
 done:
-  batten_free(ctx, largest);
+  batten_free(ctx, unit);
   if (st < 0) qp_objective_free(ctx, out);
   return st;
 }
@@ -171,6 +173,7 @@ typedef struct row_source {
   const qp_objective *o;
   const double *root; /* [n][n] of H, or NULL */
   size_t rank;
+  double *inverse; /* [n] of the metric */
   struct sized_row *order;
 } row_source;
 
@@ -188,22 +191,27 @@ static int larger_first(const void *one, const void *other) {
 /* Large rows first: then reflections keep the small digits of small rows, and weights may be 1e20 apart [Cox, Higham
  * 1998, Stability of Householder QR factorization for weighted least squares problems]. */
 static void order_rows(const row_source *s) {
+  const double ALIKE = 100; /* two digits may go */
   const qp_objective *o = s->o;
-  for (size_t i = 0; i < o->k; i++) {
-    qp_matrix_row row = qp_row_of(o->problem->a, i);
-    double largest = 0;
-    for (size_t e = 0; e < row.count; e++) {
-      double size = fabs(row.values[e]) / o->metric[qp_row_column(&row, e)];
-      largest = size > largest ? size : largest;
+  size_t rows = o->k + s->rank;
+  double most = 0, least = INFINITY;
+  for (size_t i = 0; i < rows; i++) {
+    double size = 0;
+    if (i < o->k) {
+      qp_matrix_row row = qp_row_of(o->problem->a, i);
+      for (size_t e = 0; e < row.count; e++) {
+        double entry = fabs(row.values[e]) * s->inverse[qp_row_column(&row, e)];
+        size = entry > size ? entry : size;
+      }
+      size *= sqrt(weight_of(o->problem, i));
     }
-    s->order[i] = (sized_row){sqrt(weight_of(o->problem, i)) * largest, i};
+    for (size_t j = 0; i >= o->k && j < o->n; j++)
+      size = fmax(size, fabs(s->root[i - o->k + j * o->n]) * s->inverse[j]);
+    s->order[i] = (sized_row){size, i};
+    most = size > most ? size : most;
+    least = size > 0 && size < least ? size : least;
   }
-  for (size_t i = 0; i < s->rank; i++) {
-    double largest = 0;
-    for (size_t j = 0; j < o->n; j++) largest = fmax(largest, fabs(s->root[i + j * o->n]) / o->metric[j]);
-    s->order[o->k + i] = (sized_row){largest, o->k + i};
-  }
-  qsort(s->order, o->k + s->rank, sizeof *s->order, larger_first);
+  if (most > ALIKE * least) qsort(s->order, rows, sizeof *s->order, larger_first);
 }
 
 /* Row i of the scaled [W^1/2 A | W^1/2 b; U | 0] -> row `at` of block [n + 1][ld]. */
@@ -211,7 +219,7 @@ static void put_row(const row_source *s, size_t i, double *block, size_t at, siz
   const qp_objective *o = s->o;
   size_t n = o->n;
   if (i >= o->k) {
-    for (size_t j = 0; j < n; j++) block[at + j * ld] = s->root[(i - o->k) + j * n] / o->metric[j];
+    for (size_t j = 0; j < n; j++) block[at + j * ld] = s->root[(i - o->k) + j * n] * s->inverse[j];
     block[at + n * ld] = 0;
     return;
   }
@@ -221,7 +229,7 @@ static void put_row(const row_source *s, size_t i, double *block, size_t at, siz
     for (size_t j = 0; j < n; j++) block[at + j * ld] = 0;
   for (size_t e = 0; e < row.count; e++) {
     size_t j = qp_row_column(&row, e);
-    block[at + j * ld] = w * (row.values[e] / o->metric[j]);
+    block[at + j * ld] = w * (row.values[e] * s->inverse[j]);
   }
   block[at + n * ld] = o->problem->b ? w * o->problem->b[i] : 0;
 }
@@ -283,9 +291,13 @@ static batten_status make_triangle(batten_context *ctx, const qp_objective *o) {
   st = BATTEN_E_NOMEM;
   source.order = batten_alloc_array(ctx, o->k + source.rank, sizeof *source.order);
   if (!source.order) goto done;
+  source.inverse = batten_alloc_array(ctx, o->n, sizeof *source.inverse);
+  if (!source.inverse) goto done;
+  for (size_t j = 0; j < o->n; j++) source.inverse[j] = 1 / o->metric[j];
   order_rows(&source);
   st = reduce_rows(ctx, &source, &state->triangle, &state->rows);
 done:
+  batten_free(ctx, source.inverse);
   batten_free(ctx, source.order);
   batten_free(ctx, root);
   return st;
