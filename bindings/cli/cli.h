@@ -15,6 +15,7 @@ enum { CLI_DONE = 0, CLI_FAILED = 1, CLI_USAGE = 2, CLI_INTERRUPTED = 130 };
 
 /* ---- subcommands: argv[0] is the subcommand's name ---- */
 int cli_solid(int argc, char **argv);
+int cli_qp(int argc, char **argv);
 int cli_inspect(int argc, char **argv);
 
 /* ---- options.c: one table gives the parser and the help ---- */
@@ -87,7 +88,9 @@ typedef enum cli_output_kind {
   CLI_OUTPUT_SURFACE,
   CLI_OUTPUT_PICTURE,
   CLI_OUTPUT_REPORT,
-  CLI_OUTPUT_SOLID
+  CLI_OUTPUT_SOLID,
+  CLI_OUTPUT_QP,
+  CLI_OUTPUT_QP_SOLUTION
 } cli_output_kind;
 
 typedef struct cli_output {

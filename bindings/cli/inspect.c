@@ -1,5 +1,6 @@
 /* batten inspect: what is in a file, and its measures. */
 #include "cli.h"
+#include "qp.h"
 
 #include <limits.h>
 #include <math.h>
@@ -30,7 +31,7 @@ static void print_help(void) {
       "usage: batten inspect FILE [OPTIONS]\n\n"
       "Tells what is in a file: points, a mesh (its measures, whether it is closed and manifold, triangles that "
       "cross),\n"
-      "a solid or a carrier saved by batten.\n\n");
+      "a solid or a carrier saved by batten, a quadratic program (its sizes, which engine would solve it).\n\n");
   cli_options_print(table);
   printf("\nexample:\n\n  batten inspect mesh.ply --report mesh.json\n");
 }
@@ -179,6 +180,31 @@ static batten_status tell_carrier(cli_run *run, const char *path, bool print, cl
   return st;
 }
 
+/* The engine that would be taken, and what it would need. */
+static batten_status tell_qp(cli_run *run, const char *path, bool print, cli_report *r) {
+  batten_qp_file file = {0};
+  batten_qp_engine engine = BATTEN_QP_AUTO;
+  qp_counts c;
+  size_t bytes = 0;
+  batten_status st = batten_read_qp(run->ctx, path, &file);
+  if (st < 0) return st;
+  qp_count(&file.problem, &c);
+  st = batten_qp_bytes(run->ctx, &file.problem, NULL, &bytes, &engine);
+  if (st >= 0) {
+    cli_run_clear(run);
+    qp_report_counts(&c, &file, r);
+    cli_report_text(r, "engine", qp_engine_name(engine));
+    cli_report_count(r, "bytes_predicted", bytes);
+    if (print) {
+      qp_print_counts(&c, &file);
+      qp_print_ranges(&c);
+      cli_line("engine", "%s would be taken, with %.3g MB at most", qp_engine_name(engine), (double)bytes / 1e6);
+    }
+  }
+  batten_qp_file_free(run->ctx, &file);
+  return st;
+}
+
 static int work(request *q) {
   static const char *const kinds[] = {"unknown", "points", "mesh", "solid", "carrier", "quadratic program", "document"};
   cli_run run;
@@ -210,10 +236,12 @@ static int work(request *q) {
         st = tell_carrier(&run, q->input, print, &report);
         break;
       case BATTEN_FILE_QP:
+        st = tell_qp(&run, q->input, print, &report);
+        break;
       case BATTEN_FILE_DOCUMENT:
         break;
       case BATTEN_FILE_UNKNOWN:
-        st = batten_fail(run.ctx, BATTEN_E_FORMAT, "%s: neither points, a mesh nor a document of batten", q->input);
+        st = batten_fail(run.ctx, BATTEN_E_FORMAT, "%s: neither points, a mesh, a quadratic program nor a document of batten", q->input);
     }
   }
   cli_report_number(&report, "time_total_s", batten_now() - run.started);

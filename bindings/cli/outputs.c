@@ -15,6 +15,8 @@ static const char *const surface_formats[] = {".ply", ".obj", ".stl", ".off", ".
 static const char *const outline_formats[] = {".svg", ".csv", ".xyz", ".txt", ".vtp", ".obj", NULL};
 static const char *const picture_formats[] = {".png", NULL};
 static const char *const plane_picture_formats[] = {".svg", ".png", NULL};
+static const char *const qp_formats[] = {".qps", ".sif", ".mps", ".json", NULL};
+static const char *const qp_solution_formats[] = {".json", ".csv", NULL};
 
 static bool has_extension(const char *path, const char *const *list) {
   size_t length = strlen(path);
@@ -125,6 +127,14 @@ bool cli_outputs_check(cli_outputs *o, const char *input, bool *usage) {
     }
     if (f->kind == CLI_OUTPUT_PICTURE && !has_extension(f->path, plane_picture_formats)) {
       cli_error("%s: unknown extension for --picture; use .png, for plane solids also .svg", f->path);
+      return false;
+    }
+    if (f->kind == CLI_OUTPUT_QP && !has_extension(f->path, qp_formats)) {
+      cli_error("%s: unknown extension for --write; use .qps or .json", f->path);
+      return false;
+    }
+    if (f->kind == CLI_OUTPUT_QP_SOLUTION && !has_extension(f->path, qp_solution_formats)) {
+      cli_error("%s: unknown extension for -o; use .json or .csv", f->path);
       return false;
     }
     if (input && same_file(f->path, input)) {

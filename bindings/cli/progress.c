@@ -98,10 +98,13 @@ static void explain(const cli_run *run, batten_status status, char *text, size_t
       {"opt.orientation", "--orientation"},    {"opt.cell", "--cell"},
       {"opt.width, opt.height", "--size"},     {"opt.carrier", "--carrier"},
       {", or opt.improve larger than 0", ""},  {"matrix.n: ", ""},
-      {"the context allows", "allowed are"},
+      {"the context allows", "allowed are"},   {"opt.time_limit_s", "--time-limit"},
+      {"opt.iteration_limit", "--iterations"}, {"opt.tolerance_relative", "--tolerance"},
+      {"opt.tolerance_absolute", "--tolerance"},
   };
   const char *own = batten_error(run->ctx);
-  bool points = strncmp(own, "points", 6) == 0 || strncmp(own, "matrix", 6) == 0 || strncmp(own, "seeds", 5) == 0;
+  bool points = strncmp(own, "points", 6) == 0 || strncmp(own, "matrix", 6) == 0 || strncmp(own, "seeds", 5) == 0 ||
+                strncmp(own, "problem", 7) == 0;
   snprintf(text, size, "%s%s%s", points && run->input ? run->input : "", points && run->input ? ": " : "",
            *own ? own : batten_status_text(status));
   for (size_t i = 0; i < sizeof words / sizeof *words; i++) substitute(text, size, words[i][0], words[i][1]);

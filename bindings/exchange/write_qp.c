@@ -168,14 +168,22 @@ static batten_status check_solution(batten_context *ctx, const batten_qp_solutio
   return st;
 }
 
+/* Of the formats of text the one with commas, in any case of letters. */
+static bool is_csv(const char *path) {
+  const char *csv = "csv", *end = strrchr(path, '.');
+  if (!end++ || strlen(end) != 3) return false;
+  for (size_t i = 0; i < 3; i++)
+    if ((end[i] | 0x20) != csv[i]) return false;
+  return true;
+}
+
 batten_status batten_write_qp_solution(batten_context *ctx, const batten_qp_file *file, batten_status status,
                                        const batten_qp_solution *solution, const char *path) {
   batten_status st = bx_check_pointers(ctx, path, file, "file");
   if (st == BATTEN_OK) st = bx_check_pointers(ctx, path, solution, "solution");
   if (st != BATTEN_OK) return st;
-  const char *extension = strrchr(path, '.');
   bx_format format = bx_format_of(path, NULL);
-  bool csv = format == BX_TEXT && extension && bx_word_is(extension, strlen(extension), ".csv");
+  bool csv = is_csv(path);
   if (format != BX_JSON && !csv)
     return batten_fail(ctx, BATTEN_E_INVALID, "%s: solutions are written as .json or .csv; rename the file",
                        bx_short_path(path));

@@ -323,7 +323,7 @@ static void test_solutions(batten_context *ctx, scratch *folder) {
       {BATTEN_E_NOT_CONVEX, "s.json",
        "{\"batten\": \"qp_solution\", \"version\": 1,\n\"status\": \"not convex\",\n\"ray\": [1, 0]\n}\n"},
       {BATTEN_E_LIMIT, "s.json", "{\"batten\": \"qp_solution\", \"version\": 1,\n\"status\": \"limit\"\n}\n"},
-      {BATTEN_W_STOPPED, "s.csv", "\"a,b\",0.1\n\"c\"\"d\",-1e+300\n"}};
+      {BATTEN_W_STOPPED, "s.CSV", "\"a,b\",0.1\n\"c\"\"d\",-1e+300\n"}};
   for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
     T_OK(batten_write_qp_solution(ctx, &f, cases[i].status, &s, scratch_file(folder, cases[i].name)), ctx);
     size_t size;

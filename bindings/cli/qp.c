@@ -1,0 +1,252 @@
+/* batten qp: solves a quadratic program from a file.
+ *
+ * Phases: read, solve, write. Also a proof that there is no solution is a result: solution and report are then
+ * written too, and the exit status is 1. */
+#include "qp.h"
+
+#include <limits.h>
+#include <math.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+/* ---- command line -------------------------------------------------------------------------------- */
+
+enum {
+  OPT_REPORT = CHAR_MAX + 1,
+  OPT_WRITE,
+  OPT_ENGINE,
+  OPT_TOLERANCE,
+  OPT_EXACT,
+  OPT_TIME_LIMIT,
+  OPT_ITERATIONS,
+  OPT_MEMORY,
+  OPT_THREADS
+};
+
+static const cli_option table[] = {
+    {"output", 'o', "FILE",
+     "solution: .json with multipliers and active set, .csv of x alone; may be given\nmore than once"},
+    {"report", OPT_REPORT, "FILE",
+     "figures as a flat JSON object (keys: docs/report.md); - prints them in\nplace of the summary"},
+    {"write", OPT_WRITE, "FILE", "the problem itself, as .qps or .json"},
+    {"engine", OPT_ENGINE, "NAME",
+     "auto (by estimated cost), primal or dual (active sets), interior (point);\ndefault auto"},
+    {"tolerance", OPT_TOLERANCE, "T",
+     "residuals and gap within T + T times their scale count as solved; default\n1e-9"},
+    {"exact", OPT_EXACT, NULL, "move x until every inequality holds exactly in floating point"},
+    {"time-limit", OPT_TIME_LIMIT, "S", "stop after so many seconds, with the best feasible point; default none"},
+    {"iterations", OPT_ITERATIONS, "N", "stop after so many pivots or interior steps; default by size, generous"},
+    {"memory", OPT_MEMORY, "SIZE", "use at most so much, for instance 2G; default 90 % of what the machine has"},
+    {"threads", OPT_THREADS, "N", "threads; default all cores (BLAS has its own: OPENBLAS_NUM_THREADS)"},
+    {"quiet", 'q', NULL, "no summary, no progress"},
+    {"help", 'h', NULL, "this text"},
+    {0},
+};
+
+static void print_help(void) {
+  printf(
+      "usage: batten qp PROBLEM [OPTIONS]\n\n"
+      "Solves a convex quadratic program: least squares or a Hessian, under two-sided rows and bounds. PROBLEM: "
+      ".qps\n"
+      ".sif .mps (fixed or free columns), .json, .mat (P q r l u A, as the Maros-Meszaros problems are handed on),\n"
+      "also with .gz.\n\n");
+  cli_options_print(table);
+  printf(
+      "\nexample: the point nearest to (1, 2.5) below three lines\n\n"
+      "  echo '{\"batten\": \"qp\", \"version\": 1, \"A\": [[1, 0], [0, 1]], \"b\": [1, 2.5],\n"
+      "    \"C\": [[1, -2], [-1, -2], [-1, 2]], \"lower\": [-2, -6, -2], \"x_lower\": [0, 0]}' > near.json\n"
+      "  batten qp near.json -o near-x.csv --report near-figures.json\n\n"
+      "exit status: 0 done (a warning on stderr and `status` in the report say when to look twice), 1 could not, or\n"
+      "there is no solution (infeasible, unbounded, not convex, or a limit came first; a solution .json then holds "
+      "the\n"
+      "proof), 2 wrong usage, 130 interrupted\n");
+}
+
+static bool take_option(qp_request *q, int key, const char *v) {
+  static const char *const engines[] = {"auto", "primal", "dual", "interior", NULL};
+  batten_qp_options *o = &q->options;
+  size_t count = 0;
+  int word = 0;
+  bool ok = true;
+  switch (key) {
+    case OPT_ENGINE:
+      ok = cli_parse_word("--engine", v, engines, &word);
+      o->engine = (batten_qp_engine)word;
+      break;
+    case OPT_TOLERANCE:
+      ok = cli_parse_number("--tolerance", v, 1e-300, 1, &o->tolerance_relative);
+      o->tolerance_absolute = o->tolerance_relative;
+      break;
+    case OPT_EXACT:
+      o->exact = 1;
+      break;
+    case OPT_TIME_LIMIT:
+      ok = cli_parse_number("--time-limit", v, 1e-9, INFINITY, &o->time_limit_s);
+      break;
+    case OPT_ITERATIONS:
+      ok = cli_parse_count("--iterations", v, 1, SIZE_MAX - 1, &o->iteration_limit);
+      break;
+    case OPT_MEMORY:
+      ok = cli_parse_bytes("--memory", v, &q->memory);
+      break;
+    default:
+      ok = cli_parse_count("--threads", v, 1, 64, &count);
+      q->threads = (unsigned)count;
+  }
+  return ok;
+}
+
+/* CLI_DONE: go on; q->help when only that was asked for. */
+static int parse(int argc, char **argv, qp_request *q) {
+  cli_options o;
+  if (!cli_options_open(&o, "qp", table, argc, argv)) return CLI_FAILED;
+  int status = CLI_DONE, key;
+  while (status == CLI_DONE && !q->help && (key = cli_options_next(&o)) != CLI_OPTIONS_END) {
+    bool ok = true;
+    switch (key) {
+      case CLI_OPTIONS_BAD:
+        ok = false;
+        break;
+      case 'h':
+        q->help = true;
+        break;
+      case 'q':
+        q->quiet = true;
+        break;
+      case 'o':
+        ok = cli_outputs_add(&q->outputs, CLI_OUTPUT_QP_SOLUTION, o.value);
+        break;
+      case OPT_WRITE:
+        ok = cli_outputs_add(&q->outputs, CLI_OUTPUT_QP, o.value);
+        break;
+      case OPT_REPORT:
+        ok = cli_outputs_add(&q->outputs, CLI_OUTPUT_REPORT, o.value);
+        break;
+      default:
+        ok = take_option(q, key, o.value);
+    }
+    if (!ok) status = CLI_USAGE;
+  }
+  if (status == CLI_DONE && !q->help) {
+    if (optind >= argc)
+      status = cli_usage("qp", "no problem");
+    else if (optind + 1 < argc)
+      status = cli_usage("qp", "one problem at a time, not also '%s'", argv[optind + 1]);
+    else
+      q->input = argv[optind];
+  }
+  cli_options_close(&o);
+  return status;
+}
+
+/* ---- phases -------------------------------------------------------------------------------------- */
+
+static batten_status solve(qp_work *w) {
+  batten_context *ctx = w->run.ctx;
+  batten_qp_options o = w->request->options;
+  size_t n = w->counts.unknowns, all = n + w->counts.rows;
+  batten_qp_solution *s = &w->solution;
+  s->x = batten_alloc_array(ctx, n, sizeof *s->x);
+  s->ray = batten_alloc_array(ctx, n, sizeof *s->ray);
+  s->multipliers = batten_alloc_array(ctx, all, sizeof *s->multipliers);
+  s->certificate = batten_alloc_array(ctx, all, sizeof *s->certificate);
+  s->active = batten_alloc_array(ctx, all, sizeof *s->active);
+  if (!s->x || !s->ray || !s->multipliers || !s->certificate || !s->active) return BATTEN_E_NOMEM;
+  o.x0 = w->file.x0;
+  return batten_qp_solve(ctx, &w->file.problem, &o, NULL, s, &w->info);
+}
+
+static bool is_json(const char *path) {
+  size_t length = strlen(path);
+  return length >= 5 && strcasecmp(path + length - 5, ".json") == 0;
+}
+
+static batten_status write_solution(qp_work *w, cli_output *f) {
+  const char *path = f->staged ? f->staged : f->target;
+  if (w->status < 0 && !is_json(f->path)) { /* there is no x: an older file of the name stays */
+    free(f->staged);
+    f->staged = NULL;
+    return BATTEN_OK;
+  }
+  return batten_write_qp_solution(w->run.ctx, &w->file, w->status, &w->solution, path);
+}
+
+/* Everything to its staged name, the report last, for it tells the times of the others. */
+static int write_outputs(qp_work *w) {
+  cli_outputs *outputs = &w->request->outputs;
+  double start = batten_now();
+  for (size_t i = 0; i < outputs->count; i++) {
+    cli_output *f = &outputs->items[i];
+    batten_status st = BATTEN_OK;
+    if (f->kind == CLI_OUTPUT_QP_SOLUTION) st = write_solution(w, f);
+    if (f->kind == CLI_OUTPUT_QP) st = batten_write_qp(w->run.ctx, &w->file, f->staged ? f->staged : f->target);
+    if (st < 0) return cli_run_failed(&w->run, st);
+  }
+  w->time_write_s = batten_now() - start;
+  cli_report report;
+  cli_report_open(&report);
+  qp_report(w, &report);
+  bool ok = true;
+  for (size_t i = 0; ok && i < outputs->count; i++) {
+    const cli_output *f = &outputs->items[i];
+    if (f->kind == CLI_OUTPUT_REPORT) ok = cli_report_write(&report, f->staged ? f->staged : f->target, f->path);
+  }
+  cli_report_close(&report);
+  cli_run_clear(&w->run);
+  if (cli_interrupted()) return cli_run_failed(&w->run, BATTEN_E_CANCELLED);
+  return ok && cli_outputs_commit(outputs) ? CLI_DONE : CLI_FAILED;
+}
+
+static void work_free(qp_work *w) {
+  batten_context *ctx = w->run.ctx;
+  if (!ctx) return;
+  batten_free(ctx, w->solution.x);
+  batten_free(ctx, w->solution.ray);
+  batten_free(ctx, w->solution.multipliers);
+  batten_free(ctx, w->solution.certificate);
+  batten_free(ctx, w->solution.active);
+  batten_qp_file_free(ctx, &w->file);
+  cli_run_close(&w->run);
+}
+
+static int work(qp_request *q) {
+  qp_work w = {.request = q};
+  char text[1024];
+  if (!cli_run_open(&w.run, q->threads, q->memory, q->quiet)) return CLI_FAILED;
+  w.run.input = q->input;
+  w.run.outputs = &q->outputs;
+  double start = batten_now();
+  batten_status st = batten_read_qp(w.run.ctx, q->input, &w.file);
+  w.time_read_s = batten_now() - start;
+  if (st >= 0) {
+    qp_count(&w.file.problem, &w.counts);
+    w.status = st = solve(&w);
+  }
+  int status = !qp_has_figures(st) || !w.file.memory || cli_interrupted() ? cli_run_failed(&w.run, st) : CLI_DONE;
+  if (status == CLI_DONE && st > 0) cli_run_warn(&w.run, st);
+  if (status == CLI_DONE) status = write_outputs(&w);
+  if (status == CLI_DONE && st < 0) {
+    qp_explain(&w, text, sizeof text);
+    cli_error("%s", text);
+    status = CLI_FAILED;
+  }
+  if (status == CLI_DONE && !q->quiet && !cli_outputs_to_stdout(&q->outputs)) qp_summary(&w);
+  work_free(&w);
+  return status;
+}
+
+int cli_qp(int argc, char **argv) {
+  qp_request q = {.options = batten_qp_options_default()};
+  int status = parse(argc, argv, &q);
+  if (status == CLI_DONE && q.help)
+    print_help();
+  else if (status == CLI_DONE) {
+    bool usage;
+    status = cli_outputs_check(&q.outputs, q.input, &usage) ? work(&q) : usage ? CLI_USAGE : CLI_FAILED;
+  }
+  cli_outputs_close(&q.outputs);
+  return status;
+}
