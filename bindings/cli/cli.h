@@ -78,7 +78,9 @@ bool cli_run_open(cli_run *run, unsigned threads, size_t memory_limit, bool quie
 void cli_run_close(cli_run *run);
 void cli_run_clear(cli_run *run); /* removes the bar, before other output */
 bool cli_interrupted(void);
-/* Prints why a call failed and returns the exit status. */
+/* Why the last call failed or warned, in the words of the command line. */
+void cli_run_text(const cli_run *run, batten_status status, char *text, size_t size);
+/* Prints it and returns the exit status. */
 int cli_run_failed(cli_run *run, batten_status status);
 /* A positive status is told on stderr. */
 void cli_run_warn(cli_run *run, batten_status status);

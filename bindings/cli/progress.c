@@ -89,8 +89,7 @@ static void substitute(char *text, size_t size, const char *from, const char *to
   memcpy(at, to, length);
 }
 
-/* The library's text in the words of the command line. */
-static void explain(const cli_run *run, batten_status status, char *text, size_t size) {
+void cli_run_text(const cli_run *run, batten_status status, char *text, size_t size) {
   static const char *const words[][2] = {
       {"opt.merge_radius", "--merge-radius"},  {"opt.lower and opt.upper", "--box"},
       {"opt.evaluations_max", "evaluations"},  {"opt.normals", "normals in the file"},
@@ -121,7 +120,7 @@ int cli_run_failed(cli_run *run, batten_status status) {
     return CLI_INTERRUPTED;
   }
   char text[1024];
-  explain(run, status, text, sizeof text);
+  cli_run_text(run, status, text, sizeof text);
   cli_error("%s", text);
   return CLI_FAILED;
 }
@@ -130,6 +129,6 @@ void cli_run_warn(cli_run *run, batten_status status) {
   if (status <= 0) return;
   cli_run_clear(run);
   char text[1024];
-  explain(run, status, text, sizeof text);
+  cli_run_text(run, status, text, sizeof text);
   cli_error("warning: %s", text);
 }

@@ -2,6 +2,7 @@
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "qp.h"
 
@@ -208,20 +209,21 @@ void qp_summary(const qp_work *w) {
 enum { NAMED = 4 };
 
 BATTEN_PRINTF(3, 4) static void append(char *text, size_t size, const char *format, ...) {
-  size_t length = 0;
-  while (length < size && text[length]) length++;
-  if (length >= size) return;
+  size_t length = strlen(text);
   va_list args;
   va_start(args, format);
   vsnprintf(text + length, size - length, format, args);
   va_end(args);
 }
 
-/* The NAMED largest values by size, in descending order; returns how many are not 0. */
+/* The NAMED largest values by size, in descending order; returns how many are more than rounding beside the largest.
+ */
 static size_t largest(const double *values, size_t count, size_t index[NAMED]) {
   size_t found = 0;
+  double most = 0;
+  for (size_t i = 0; i < count; i++) most = fmax(most, fabs(values[i]));
   for (size_t i = 0; i < count; i++) {
-    if (!(fabs(values[i]) > 0)) continue;
+    if (!(fabs(values[i]) > 1e-6 * most)) continue;
     size_t at = found < NAMED ? found : NAMED;
     found++;
     for (; at > 0 && fabs(values[index[at - 1]]) < fabs(values[i]); at--)
@@ -270,23 +272,22 @@ static void append_proof(const qp_work *w, char *text, size_t size, bool sides) 
 
 void qp_explain(const qp_work *w, char *text, size_t size) {
   text[0] = '\0';
-  append(text, size, "%s: %s", w->request->input, batten_status_text(w->status));
-  switch (w->status) {
-    case BATTEN_E_INFEASIBLE:
-      append(text, size, "; these contradict each other:");
-      append_proof(w, text, size, true);
-      break;
-    case BATTEN_E_UNBOUNDED:
-      append(text, size, " along");
-      append_proof(w, text, size, false);
-      append(text, size, "; bound these unknowns");
-      break;
-    case BATTEN_E_NOT_CONVEX:
-      append(text, size, ": it curves downwards along");
-      append_proof(w, text, size, false);
-      break;
-    default:
-      append(text, size, " (%zu iterations, %.3g s); raise --iterations or --time-limit", w->info.iterations,
-             w->info.time_s);
+  append(text, size, "%s: ", w->request->input);
+  if (w->status == BATTEN_E_LIMIT) {
+    size_t length = strlen(text);
+    cli_run_text(&w->run, w->status, text + length, size - length);
+    return;
+  }
+  append(text, size, "%s", batten_status_text(w->status));
+  if (w->status == BATTEN_E_INFEASIBLE) {
+    append(text, size, "; these contradict each other:");
+    append_proof(w, text, size, true);
+  } else if (w->status == BATTEN_E_UNBOUNDED) {
+    append(text, size, " along");
+    append_proof(w, text, size, false);
+    append(text, size, "; bound these unknowns");
+  } else {
+    append(text, size, ": it curves downwards along");
+    append_proof(w, text, size, false);
   }
 }

@@ -25,7 +25,7 @@ holds near-figures.json objective 'x > 0.4 - 1e-12 && x < 0.4 + 1e-12'
 ls -A >before
 run 2 "no problem" qp
 run 2 "not also 'b.qps'" qp a.qps b.qps
-run 2 "unknown option '--engin'; did you mean '--engine'?" qp near.json --engin dual
+run 2 "unknown option '--egnine'; did you mean '--engine'?" qp near.json --egnine dual
 run 2 "--engine: 'duel' is not one of auto, primal, dual, interior; did you mean 'dual'?" qp near.json --engine duel
 run 2 "--tolerance: '-1'" qp near.json --tolerance -1
 run 2 "--time-limit: '0'" qp near.json --time-limit 0
