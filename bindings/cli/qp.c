@@ -226,7 +226,7 @@ static int work(qp_request *q) {
     w.status = st = solve(&w);
   }
   if (st < 0 && qp_has_figures(st)) qp_explain(&w, text, sizeof text);
-  int status = !qp_has_figures(st) || !w.file.memory || cli_interrupted() ? cli_run_failed(&w.run, st) : CLI_DONE;
+  int status = !qp_has_figures(st) || cli_interrupted() ? cli_run_failed(&w.run, st) : CLI_DONE;
   if (status == CLI_DONE && st > 0) cli_run_warn(&w.run, st);
   if (status == CLI_DONE) status = write_outputs(&w);
   if (status == CLI_DONE && st < 0) {
