@@ -31,7 +31,7 @@ typedef struct presolver {
   size_t *heads, cells; /* [cells] first constraint of each cell of the hash table, NONE = empty */
   size_t *next;         /* [m] next constraint in the same cell */
   uint64_t *key;        /* [m] cell of constraint k before hashing */
-  double slack; /* how far the caller lets a row or bound be violated */
+  double slack;         /* how far the caller lets a row or bound be violated */
   double *certificate;
 } presolver;
 
@@ -290,6 +290,17 @@ static void range_of(const presolver *s, const qp_matrix_row *row, double *least
   *least = low, *most = high, *size = all;
 }
 
+/* What y = 1 or -1 times constraint k leaves over, the bounds take: the caller's, or rows of one entry. */
+static void prove_by_bounds(const presolver *s, size_t k, double y) {
+  qp_matrix_row row = qp_row_of(s->problem->c, s->out->row[k]);
+  for (size_t e = 0; e < row.count; e++) {
+    size_t j = qp_row_column(&row, e);
+    double left = -y * (row.values[e] * s->out->scale[k]);
+    if (left > 0) prove(s, s->x_lower_from[j], left * s->x_lower_factor[j]);
+    if (left < 0) prove(s, s->x_upper_from[j], left * s->x_upper_factor[j]);
+  }
+}
+
 /* Drops sides of constraint k that the bounds imply: both of an equality or none, so that it stays one. */
 static batten_status judge_by_bounds(presolver *s, size_t k) {
   qp_presolve *o = s->out;
@@ -305,6 +316,7 @@ static batten_status judge_by_bounds(presolver *s, size_t k) {
   if (above || below) {
     size_t from = above ? o->lower_from[k] : o->upper_from[k];
     prove(s, from, above ? o->lower_factor[k] : -o->upper_factor[k]);
+    prove_by_bounds(s, k, above ? 1 : -1);
     return batten_fail(s->ctx, BATTEN_E_INFEASIBLE,
                        "row %zu of c: within the bounds of x it is in [%g, %g], which its sides exclude; relax one",
                        from, least, most);

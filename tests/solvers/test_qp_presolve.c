@@ -93,6 +93,11 @@ static void test_infeasible(batten_context *ctx) {
          (double[]){-inf, 2}, (double[]){inf, inf});
   refuse(ctx, "row 1 of c and row 0 of c", 2, 1, (double[]){-1, 1e150}, (double[]){1, 1e151}, (double[]){inf, inf},
          NULL, NULL);
+  /* the bound of x[0] is row 1, which has its part in the proof */
+  refuse(ctx, "row 0 of c: within the bounds of x it is in [-inf, 3]", 2, 2, (double[]){1, 1, 2, 0},
+         (double[]){4, -inf}, (double[]){inf, 2}, (double[]){-inf, -inf}, (double[]){inf, 2});
+  refuse(ctx, "row 0 of c: within the bounds of x it is in [3, inf]", 3, 2, (double[]){-1, 1, -2, 0, 0, -3},
+         (double[]){-inf, 2, -inf}, (double[]){2.5, inf, -6}, NULL, NULL);
   refuse(ctx, "row 0 of c: within the bounds of x it is in [-3, 3]", 1, 2, (double[]){1, -2}, (double[]){4},
          (double[]){inf}, (double[]){-1, -1}, (double[]){1, 1});
   refuse(ctx, "row 0 of c: within the bounds of x it is in [-3, 3]", 1, 2, (double[]){1, -2}, (double[]){-inf},
