@@ -22,10 +22,13 @@ static const double FEASIBILITY = 8 * DBL_EPSILON;
 
 /* ---- Life ---- */
 
-/* As many chunks as candidates where there are rows enough, and more where a chunk would be more than 8192 entries:
- * BLAS is left to do each product on the thread that calls it. */
+/* Rows whose products are one call of BLAS and one task: 8192 entries, for which BLAS stays on the thread that calls
+ * it. */
+static size_t block_rows(const qp_rows *rows) { return 8192 / (rows->n > 0 ? rows->n : 1); }
+
+/* As many chunks as candidates where there are rows enough, and more where a chunk would be larger than a block. */
 static size_t chunk_rows(const qp_rows *rows) {
-  size_t most = 8192 / (rows->n > 0 ? rows->n : 1), chunk = rows->m / CANDIDATES;
+  size_t most = block_rows(rows), chunk = rows->m / CANDIDATES;
   if (chunk > most) chunk = most;
   return chunk < 4 ? 4 : chunk;
 }
@@ -46,6 +49,8 @@ batten_status qp_pricing_new(batten_context *ctx, const qp_rows *rows, const sig
   *p = (qp_pricing){.rows = rows, .active = active, .inverse = inverse, .feasibility = FEASIBILITY, .path = INFINITY};
   p->chunk = chunk_rows(rows);
   p->chunks = m / p->chunk + (m % p->chunk != 0);
+  p->per_block = block_rows(rows) / p->chunk;
+  if (p->per_block == 0) p->per_block = 1;
   if (!count_doubles(rows, p->chunks, &doubles))
     return batten_fail(ctx, BATTEN_E_TOO_LARGE, "%zu constraints of %zu unknowns", m, n);
   p->last = batten_alloc_array(ctx, doubles, sizeof *p->last);
@@ -83,24 +88,31 @@ size_t qp_pricing_bytes(const qp_rows *rows) {
 
 /* ---- One row ---- */
 
+static double length(size_t n, const double *x) {
+  double square = 0;
+  for (size_t j = 0; j < n; j++) square += x[j] * x[j];
+  return sqrt(square);
+}
+
 double qp_pricing_tolerance(const qp_pricing *p, size_t k, const double *x) {
-  const double *values, *lower = p->rows->lower, *upper = p->rows->upper;
+  const double *values;
   const uint32_t *columns;
   size_t count = qp_rows_entries(p->rows, k, &values, &columns);
   double sum = 0;
   for (size_t e = 0; e < count; e++) sum += fabs(values[e] * x[columns ? columns[e] : e]);
-  sum *= p->rows->scale[k];
-  double side = fmax(isfinite(lower[k]) ? fabs(lower[k]) : 0, isfinite(upper[k]) ? fabs(upper[k]) : 0);
-  return p->feasibility * (sum + side);
+  return p->feasibility * p->rows->scale[k] * sum;
 }
 
 static double slack_at(const qp_rows *rows, size_t k, double product) {
-  return fmin(product - rows->lower[k], rows->upper[k] - product);
+  double above = product - rows->lower[k], below = rows->upper[k] - product;
+  return above < below ? above : below;
 }
 
 double qp_pricing_violation(const qp_pricing *p, size_t k, double product, const double *x, signed char *side) {
   double missing = -slack_at(p->rows, k, product);
-  if (!(missing > 0) || missing <= qp_pricing_tolerance(p, k, x)) return 0;
+  if (!(missing > 0)) return 0;
+  /* |a_k| = 1: most violations are far above what the tolerance can be. */
+  if (missing <= 2 * p->feasibility * p->length && missing <= qp_pricing_tolerance(p, k, x)) return 0;
   *side = product < p->rows->lower[k] ? QP_LOWER : QP_UPPER;
   return missing;
 }
@@ -112,14 +124,17 @@ typedef struct pass {
   const double *x;
 } pass;
 
-static void price_chunk(void *arg, size_t index) {
+static void price_block(void *arg, size_t index) {
   const pass *job = arg;
   qp_pricing *p = job->p;
   const qp_rows *rows = p->rows;
-  size_t first = index * p->chunk, left = rows->m - first, count = left < p->chunk ? left : p->chunk, due = 0;
-  double *till = p->safe_till + first;
-  p->offer[index] = SIZE_MAX;
-  p->offer_by[index] = 0;
+  size_t block = p->chunk * p->per_block, first = index * block, left = rows->m - first;
+  size_t count = left < block ? left : block, due = 0;
+  double *till = p->safe_till + first, keep = p->path * (1 - 4 * DBL_EPSILON);
+  for (size_t i = index * p->per_block; i < p->chunks && i < (index + 1) * p->per_block; i++) {
+    p->offer[i] = SIZE_MAX;
+    p->offer_by[i] = 0;
+  }
   for (size_t i = 0; i < count; i++) due += till[i] > p->path ? 0 : 1;
   if (due == 0) return;
 
@@ -127,18 +142,18 @@ static void price_chunk(void *arg, size_t index) {
   bool all = due > count / 3;
   if (all) qp_rows_times(rows, first, count, job->x, till);
   for (size_t i = 0; i < count; i++) {
-    size_t k = first + i;
+    size_t k = first + i, to = k / p->chunk;
     if (qp_rows_is_equality(rows, k)) till[i] = INFINITY;
     if (till[i] == INFINITY || (!all && till[i] > p->path)) continue;
     double product = all ? till[i] : qp_rows_dot(rows, k, job->x);
     signed char side;
     double slack = slack_at(rows, k, product);
-    till[i] = slack + p->path * (1 - 4 * DBL_EPSILON);
-    if (!(-slack > p->offer_by[index]) || p->active[k] != QP_FREE) continue;
+    till[i] = slack + keep;
+    if (!(-slack > p->offer_by[to]) || p->active[k] != QP_FREE) continue;
     double violation = qp_pricing_violation(p, k, product, job->x, &side);
-    if (violation <= p->offer_by[index]) continue;
-    p->offer[index] = k;
-    p->offer_by[index] = violation;
+    if (violation <= p->offer_by[to]) continue;
+    p->offer[to] = k;
+    p->offer_by[to] = violation;
   }
 }
 
@@ -195,15 +210,12 @@ static void gather(qp_pricing *p) {
 
 bool qp_pricing_pass(batten_context *ctx, qp_pricing *p, const double *x) {
   size_t n = p->rows->n;
-  double move = 0, size = 0;
-  for (size_t j = 0; j < n; j++) {
-    move += (x[j] - p->last[j]) * (x[j] - p->last[j]);
-    size += x[j] * x[j];
-  }
+  double move = 0;
+  for (size_t j = 0; j < n; j++) move += (x[j] - p->last[j]) * (x[j] - p->last[j]);
   memcpy(p->last, x, n * sizeof *x);
+  p->length = length(n, x);
   p->path += sqrt(move) * (1 + 1e-9); /* far above the rounding of lengths, those of rows among them */
-  if (!(p->path * p->path <=
-        size)) { /* first pass, or slacks could drown in the rounding of safe_till: all rows anew */
+  if (!(p->path <= p->length)) { /* first pass, or slacks could drown in the rounding of safe_till: all rows anew */
     p->path = 0;
     for (size_t k = 0; k < p->rows->m; k++)
       if (p->safe_till[k] != INFINITY) p->safe_till[k] = -1;
@@ -211,10 +223,11 @@ bool qp_pricing_pass(batten_context *ctx, qp_pricing *p, const double *x) {
 
   const double WORTH_THREADS = 1 << 19; /* entries: some 50 us */
   pass job = {p, x};
+  size_t blocks = (p->chunks + p->per_block - 1) / p->per_block;
   if (batten_threads(ctx) > 1 && (double)p->rows->m * (double)n > WORTH_THREADS)
-    batten_parallel(ctx, p->chunks, price_chunk, &job);
+    batten_parallel(ctx, blocks, price_block, &job);
   else
-    for (size_t i = 0; i < p->chunks; i++) price_chunk(&job, i);
+    for (size_t i = 0; i < blocks; i++) price_block(&job, i);
   gather(p);
   return p->count > 0;
 }
@@ -224,6 +237,7 @@ size_t qp_pricing_worst(qp_pricing *p, const double *x) {
   size_t worst = SIZE_MAX;
   double most = 0;
   signed char side;
+  p->length = length(rows->n, x);
   batten_la_gemv(BATTEN_LA_DOUBLE, 'T', rows->n, p->count, 1, p->copy, rows->n, x, 0, p->product);
   for (size_t i = 0; i < p->count; i++) {
     size_t k = p->candidate[i];

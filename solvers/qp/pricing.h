@@ -9,14 +9,16 @@ typedef struct qp_pricing {
   const qp_rows *rows;
   const signed char *active; /* [m] members are not priced */
   const double *inverse;     /* [n][n] R^-1 */
-  double feasibility;        /* violations up to this times |x| and the side are rounding */
+  double feasibility;        /* violations up to this times sum_i |a_ki x_i| are rounding */
 
   /* Rows have length one: a slack shrinks by no more than x moves. */
+  double length;     /* |x| */
   double path;       /* length of the way that x went from pass to pass */
   double *last;      /* [n] x of the last pass */
   double *safe_till; /* [m] a row needs no product while path is below */
 
-  size_t chunk, chunks; /* rows of a task, tasks; they depend on m and n alone */
+  size_t chunk, chunks; /* rows that make one offer; they depend on m and n alone */
+  size_t per_block;     /* chunks of one task */
   size_t *offer;        /* [chunks] most violated row of each chunk, SIZE_MAX = none */
   double *offer_by;     /* by how much */
 
@@ -50,10 +52,11 @@ static inline void qp_pricing_skip(qp_pricing *p, size_t place) {
   p->first = 0; /* no measure for the others */
 }
 
-/* By how much a_k'x = product misses its sides beyond rounding, else 0; *side the side missed. */
+/* By how much a_k'x = product misses its sides beyond rounding, else 0; *side the side missed. For the x of the last
+ * qp_pricing_pass or qp_pricing_worst. */
 double qp_pricing_violation(const qp_pricing *p, size_t k, double product, const double *x, signed char *side);
 
-/* The rounding allowed to a_k'x. */
+/* The rounding allowed to a_k'x; also to the side, for near it the two are the same. */
 double qp_pricing_tolerance(const qp_pricing *p, size_t k, const double *x);
 
 #endif
