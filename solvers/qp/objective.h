@@ -38,9 +38,6 @@ batten_status qp_objective_sparse(batten_context *ctx, const qp_objective *o, qp
 /* Whether H is semidefinite, for engines that do without factors: E_NOT_CONVEX, *index, ray [n] as of factor. By a sparse
  * factor of H where H is sparse. */
 batten_status qp_objective_convex(batten_context *ctx, const qp_objective *o, size_t *index, double *ray);
-static inline batten_status qp_objective_minors(batten_context *ctx, const qp_objective *o, size_t *index, double *ray) {
-  return qp_objective_convex(ctx, o, index, ray);
-}
 
 /* ---- hessian.c: a symmetric matrix alone ---- */
 

@@ -130,7 +130,7 @@ static batten_status run_interior(solver *s) {
   qp_sparse objective;
   batten_matrix h;
   void *memory = NULL;
-  batten_status st = qp_objective_minors(s->ctx, &s->objective, &s->task.not_convex_index, s->point.ray);
+  batten_status st = qp_objective_convex(s->ctx, &s->objective, &s->task.not_convex_index, s->point.ray);
   if (st < 0) return st;
   st = qp_objective_sparse(s->ctx, &s->objective, &objective, &h, &memory);
   if (st < 0) return st;

@@ -159,6 +159,13 @@ static void test_by_hand(batten_context *ctx) {
   T_CHECK(qp_objective_value(&o, at) == 0, "nothing has the value 0");
   qp_objective_free(ctx, &o);
 
+  batten_matrix thin = batten_matrix_dense(2, 0, NULL);
+  none.a = &thin, none.b = b;
+  T_OK(qp_objective_new(ctx, &none, &o), ctx);
+  T_OK(qp_objective_factor(ctx, &o, 1, r, base, &index, ray), ctx);
+  T_CHECK(qp_objective_value(&o, at) == 2, "rows without unknowns have a value");
+  qp_objective_free(ctx, &o);
+
   batten_qp_problem linear = {.struct_size = sizeof linear, .n = 2, .g = b};
   T_OK(qp_objective_new(ctx, &linear, &o), ctx);
   T_STATUS(qp_objective_factor(ctx, &o, 0, r, base, &index, ray), BATTEN_E_SINGULAR, ctx, "not strictly convex");
