@@ -5,8 +5,8 @@
 
 /* Below, the dense engines win whatever the rows are, and an ordering of the unknowns costs more than it tells. */
 static const size_t ALWAYS_DENSE = 48;
-/* Beyond, a dense engine is not tried for want of something better: about a minute. */
-static const double AFFORDABLE = 1e11;
+/* Beyond, a dense engine is not tried for want of something better: some ten seconds. */
+static const double AFFORDABLE = 3e10;
 
 static qp_cost saturated_sum(qp_cost a, qp_cost b) {
   qp_cost sum = {0, a.flops + b.flops};
@@ -71,7 +71,9 @@ batten_status qp_choose(batten_context *ctx, const qp_task *task, const batten_q
     taken[best] = true;
   }
   if (plan->count == 0) plan->engine[plan->count++] = n > ALWAYS_DENSE ? BATTEN_QP_INTERIOR : BATTEN_QP_DUAL;
-  for (size_t i = 0; i < plan->count; i++)
+  for (size_t i = 0; i < plan->count; i++) {
+    plan->flops[i] = cost[plan->engine[i]].flops;
     if (cost[plan->engine[i]].bytes > plan->bytes) plan->bytes = cost[plan->engine[i]].bytes;
+  }
   return BATTEN_OK;
 }

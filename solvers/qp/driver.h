@@ -44,6 +44,7 @@ batten_status qp_refine(batten_context *ctx, const qp_task *task, qp_point *poin
  * point even where it is only the last resort; that takes an ordering of the unknowns. */
 typedef struct qp_plan {
   batten_qp_engine engine[3];
+  double flops[3];
   size_t count;
   size_t bytes;          /* the most that one of them takes, factors included */
   bool dense_affordable; /* for the last digits of the interior point's result */

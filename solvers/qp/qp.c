@@ -232,22 +232,32 @@ static batten_status attempt(solver *s, batten_qp_engine engine) {
 
 /* ---- The last digits ---- */
 
-/* Whether residuals are of the size of rounding in x and y themselves: no engine can do better. */
-static bool at_rounding(const solver *s) {
-  const double ROUNDING = 1e-14;
+static bool within(const solver *s, double level) {
   const batten_qp_info *f = &s->info;
-  return s->found && f->primal_residual <= ROUNDING * f->primal_scale &&
-         f->dual_residual <= ROUNDING * f->dual_scale && f->duality_gap <= ROUNDING * f->gap_scale;
+  return s->found && f->primal_residual <= level * f->primal_scale && f->dual_residual <= level * f->dual_scale &&
+         f->duality_gap <= level * f->gap_scale;
+}
+
+/* Rounding of x and y themselves: no engine can do better. Tolerances may be out of reach by then. */
+static bool at_rounding(const solver *s) { return within(s, 1e-14); }
+
+/* Whether the plan's engine i may bring something: the nearer the best so far is, the less it may cost. */
+static bool worth_trying(const solver *s, size_t i) {
+  const double NEAR = 1e3, CHEAP = 3e9; /* 3e9: a second or two */
+  if (finished(s) || at_rounding(s)) return false;
+  return i == 0 || s->plan.flops[i] <= CHEAP || !(merit(&s->info, s->o) <= NEAR);
 }
 
 /* The best point's working set, solved for outright; where that set is not yet the right one, a dense engine goes on
  * from it, if the caller lets engines help each other. */
 static batten_status polish(solver *s) {
-  const size_t CHEAP = 300; /* unknowns for which a factor costs less than 50 ms */
+  const size_t CHEAP = 300, MOST = 1000; /* unknowns for which it takes some 50 ms, a second */
+  const double ENOUGH = 1e-12;
   double error;
-  if (!s->found || s->proof < 0 || s->stop < 0 || s->n == 0 || at_rounding(s)) return BATTEN_OK;
+  if (!s->found || s->proof < 0 || s->stop < 0 || s->n == 0) return BATTEN_OK;
+  if (at_rounding(s) || (optimal(s) && within(s, ENOUGH))) return BATTEN_OK;
   if (!s->task.r && !s->o->hand_over) return BATTEN_OK;
-  if (!s->plan.dense_affordable || (optimal(s) && s->n > CHEAP)) return BATTEN_OK;
+  if (!s->plan.dense_affordable || s->n > (optimal(s) ? CHEAP : MOST)) return BATTEN_OK;
   batten_status st = qp_dense_factor(s->ctx, &s->task, s->point.ray);
   if (st < 0) return st == BATTEN_E_NOMEM ? st : BATTEN_OK;
   set_start(s);
@@ -414,7 +424,7 @@ static batten_status solve(solver *s) {
   if (st < 0) return st;
   if (s->proof == BATTEN_OK) st = qp_choose(s->ctx, &s->task, s->o, false, &s->plan);
   s->setup_s = batten_now() - s->start;
-  for (size_t i = 0; st >= 0 && i < s->plan.count && !finished(s) && !at_rounding(s); i++) {
+  for (size_t i = 0; st >= 0 && i < s->plan.count && worth_trying(s, i); i++) {
     st = attempt(s, s->plan.engine[i]);
     if (st >= 0) st = polish(s);
   }
