@@ -137,12 +137,12 @@ static void write_proof(qp_search *s) {
   }
 }
 
-/* At a minimum of F: whether its rest is rounding after all, seen from x on the members' sides and with the errors of
- * all the way that led here. Rows that depend on the members cannot be met better than these are. */
+/* At a minimum of F: whether its rest is rounding after all, seen from x on the members' sides, against the length of
+ * x and the entries that it had on the way. Rows that depend on the members cannot be met better than these are. */
 static bool rest_is_rounding(qp_search *s) {
   qp_search_return(s);
   for (size_t i = 0; i < s->sighted; i++)
-    s->rounding[i] = fmax(s->rounding[i], qp_search_error(s->n) * qp_search_terms(s, s->sight[i], s->ever));
+    s->rounding[i] = qp_search_error(s->n) * fmax(qp_search_terms(s, s->sight[i], s->ever), s->size);
   for (size_t i = 0; i < s->sighted; i++)
     if (violated_side(s, i, QP_LOOSE) != QP_FREE) return false;
   return true;

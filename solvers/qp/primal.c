@@ -105,13 +105,14 @@ static batten_status descend(qp_search *s) {
 
 /* ---- Survey of all rows ---- */
 
-/* How far a value is outside of its row's sides, beyond rounding; size is that of s->most. */
-static double outside(const qp_search *s, size_t k, double value, double size) {
+/* How far a value is outside of its row's sides, beyond rounding: of a row in sight in terms of the length of x,
+ * since the search has done what it could; of others in those of its own terms. */
+static double outside(const qp_search *s, size_t k, double value) {
   double lower = s->rows->lower[k], upper = s->rows->upper[k], side = value < lower ? lower : upper;
   double by = value < lower ? lower - value : value - upper, error = qp_search_error(s->n);
-  if (s->is[k] & QP_SEEN) error *= QP_LOOSE; /* the search has done what it could */
   if (!(by > 0)) return 0;
-  if (by > error * (size + fabs(side))) return by; /* the row has length 1 */
+  if (by > error * (s->size + fabs(side))) return by; /* the row has length 1 */
+  if (s->is[k] & QP_SEEN) return 0;
   return by > error * (qp_search_terms(s, k, s->most) + fabs(side)) ? by : 0;
 }
 
@@ -120,19 +121,15 @@ static double outside(const qp_search *s, size_t k, double value, double size) {
 static bool survey(qp_search *s) {
   size_t m = s->m, before = s->sighted, stops = m;
   size_t stretch = m / 64 < 32 ? 32 : m / 64 > 1024 ? 1024 : m / 64;
-  double alpha = 1, size = 0;
-  for (size_t j = 0; j < s->n; j++) {
-    s->most[j] = fmax(s->most[j], fabs(s->x[j]));
-    size += s->most[j] * s->most[j];
-  }
-  size = sqrt(size);
+  double alpha = 1;
+  qp_search_remember(s);
   bool all_hold = true;
   for (size_t first = 0; first < m; first += stretch) {
     size_t count = m - first < stretch ? m - first : stretch, worst = m;
     double most = 0;
     qp_rows_times(s->rows, first, count, s->x, s->new_value + first);
     for (size_t k = first; k < first + count; k++) {
-      double by = outside(s, k, s->new_value[k], size);
+      double by = outside(s, k, s->new_value[k]);
       if (by == 0) continue;
       all_hold = false;
       if (s->is[k] & QP_SEEN) continue;
@@ -228,7 +225,7 @@ static batten_status start(qp_search *s) {
   bool given = s->point->have_x;
   memcpy(s->x, given ? s->point->x : s->aim, s->n * sizeof *s->x);
   if (given) qp_search_return(s);
-  for (size_t j = 0; j < s->n; j++) s->most[j] = fabs(s->x[j]);
+  qp_search_remember(s);
   for (size_t k = 0; k < few; k++) qp_search_see(s, k);
   survey(s);
   st = take_members(s, s->have_safe);

@@ -31,6 +31,7 @@ typedef struct qp_search {
   double *y;        /* [n] multipliers of the members */
   double *d, *work; /* [n] scratch */
   double *most;     /* [n] largest |x_j| since values were computed from x */
+  double size;      /* length of most */
   double *ever;     /* [n] largest |x_j| of all */
   double *f;        /* [n] phase 1: gradient of the sum of infeasibilities */
   double *jf;       /* [n] J'f */
@@ -71,6 +72,8 @@ double qp_search_tolerance(const qp_search *s, size_t place, double side);
 
 /* Counts a pivot; BATTEN_OK, E_LIMIT or E_CANCELLED. */
 batten_status qp_search_pivot(qp_search *s);
+/* Takes x into most, size and ever. */
+void qp_search_remember(qp_search *s);
 /* Brings constraint k into sight. */
 void qp_search_see(qp_search *s, size_t k);
 /* Values and rounding of the rows in sight, from x. */

@@ -51,17 +51,20 @@ batten_status qp_search_pivot(qp_search *s) {
   return qp_limits_check(s->ctx, s->limits, s->point->iterations, count / (count + 2 * (double)s->n));
 }
 
-static void remember(qp_search *s) {
+void qp_search_remember(qp_search *s) {
   for (size_t j = 0; j < s->n; j++) {
     s->most[j] = fmax(s->most[j], fabs(s->x[j]));
     s->ever[j] = fmax(s->ever[j], s->most[j]);
   }
+  s->size = norm(s->n, s->most);
 }
 
+/* An unknown that is zero has errors from what it is computed from: more than its own size tells. */
 static void compute(qp_search *s, size_t place) {
+  const double FLOOR = 0x1p-20;
   size_t k = s->sight[place];
   s->value[place] = qp_rows_dot(s->rows, k, s->x);
-  s->rounding[place] = qp_search_error(s->n) * qp_search_terms(s, k, s->most);
+  s->rounding[place] = qp_search_error(s->n) * fmax(qp_search_terms(s, k, s->most), FLOOR * s->size);
 }
 
 void qp_search_see(qp_search *s, size_t k) {
@@ -73,7 +76,7 @@ void qp_search_see(qp_search *s, size_t k) {
 
 void qp_search_refresh(qp_search *s) {
   memset(s->most, 0, s->n * sizeof *s->most);
-  remember(s);
+  qp_search_remember(s);
   for (size_t i = 0; i < s->sighted; i++) compute(s, i);
   s->since = 0;
 }
@@ -94,7 +97,7 @@ bool qp_search_move(qp_search *s, double alpha) {
     for (size_t j = 0; j < s->n; j++) s->x[j] += alpha * s->p[j];
     for (size_t i = 0; i < s->sighted; i++)
       if (!(s->is[s->sight[i]] & QP_MEMBER)) s->value[i] += alpha * s->slope[i];
-    remember(s);
+    qp_search_remember(s);
   }
   bool moved = length > qp_search_error(s->n) * size;
   if (moved) s->stuck = 0;
