@@ -140,8 +140,7 @@ void qp_active_solve_transposed(const qp_active *set, const double *b, double *u
 
 /* ---- Dependence ---- */
 
-/* sum_i |a_ki| reach_i: bounds |J'a_k|, and times eps the rounding errors in it. */
-static double row_reach(const qp_active *set, size_t k) {
+double qp_active_row_reach(const qp_active *set, size_t k) {
   const double *values;
   const uint32_t *columns;
   size_t count = qp_rows_entries(set->rows, k, &values, &columns);
@@ -154,7 +153,7 @@ static double row_reach(const qp_active *set, size_t k) {
 static double dependence(const qp_active *set) { return 4 * (double)set->n * DBL_EPSILON; }
 
 bool qp_active_depends(const qp_active *set, size_t k, const double *d) {
-  return set->q == set->n || norm(set->n - set->q, d + set->q) <= dependence(set) * row_reach(set, k);
+  return set->q == set->n || norm(set->n - set->q, d + set->q) <= dependence(set) * qp_active_row_reach(set, k);
 }
 
 /* ---- One at a time ---- */
@@ -255,7 +254,7 @@ batten_status qp_active_add_many(batten_context *ctx, qp_active *set, size_t cou
   double *reach = tau + most;
   project_many(set, count, k, work, w);
   for (size_t i = 0; i < count; i++) {
-    reach[i] = row_reach(set, k[i]);
+    reach[i] = qp_active_row_reach(set, k[i]);
     for (size_t l = q; l < n; l++) w[l + i * n] /= reach[i];
   }
   st = batten_la_geqp3(ctx, rest, count, w + q, n, pivots, tau);

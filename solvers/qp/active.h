@@ -36,6 +36,9 @@ void qp_active_project(const qp_active *set, size_t k, double *d);
 /* d [n] = J'v for any v [n]. */
 void qp_active_project_vector(const qp_active *set, const double *v, double *d);
 
+/* sum_i |a_ki| reach_i: bounds |J'a_k|, and times eps the rounding errors in it. */
+double qp_active_row_reach(const qp_active *set, size_t k);
+
 /* Whether a_k depends on the members up to rounding, given d: |J2'a_k| against sum_i |a_ki| reach_i >= |J'a_k|, of
  * which eps is the size of the errors in d. Does not change when rows, unknowns or the objective are scaled. */
 bool qp_active_depends(const qp_active *set, size_t k, const double *d);

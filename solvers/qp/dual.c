@@ -25,7 +25,9 @@ typedef struct dual {
   qp_pricing pricing;
   size_t equalities;    /* members that stay, in front */
   size_t updates;       /* of the factors since they were fresh */
-  double rise;          /* of the objective since the last pass */
+  double length;        /* |Rx| at the last settling: x is known to eps of length times reach (active.h) */
+  double noise;         /* that eps: grows where pivots do not end */
+  bool moved;           /* some pivot since the last pass went further than that */
   double *x;            /* point->x */
   double *y;            /* [n] of the members: gradient = N y */
   double *d, *part, *b; /* [n] scratch: J'a, T^-1 d, sides */
@@ -41,6 +43,9 @@ static void solve(dual *s) {
   for (size_t i = 0; i < q; i++) s->b[i] = qp_active_bound(set, i);
   qp_active_solve_transposed(set, s->b, u);
   memcpy(u + q, set->target + q, (n - q) * sizeof *u);
+  s->length = 0;
+  for (size_t i = 0; i < n; i++) s->length += u[i] * u[i];
+  s->length = sqrt(s->length);
   memset(s->x, 0, n * sizeof *s->x);
   qp_active_combine(set, 0, n, 1, u, s->x);
   for (size_t i = 0; i < q; i++) s->y[i] = u[i] - set->target[i];
@@ -166,13 +171,16 @@ done:
 
 /* ---- Rows that depend on the members ---- */
 
+/* What rounding in the factors may leave in a_k'x. */
+static double noise(const dual *s, size_t k) { return s->noise * qp_active_row_reach(&s->set, k) * s->length; }
+
 /* By how much a dependent row may miss its side by rounding alone: a_k = N part, so its error is made up of theirs.
  */
 static double dependent_tolerance(const dual *s, size_t k, const double *part) {
   double sum = qp_pricing_tolerance(&s->pricing, k, s->x);
   for (size_t i = 0; i < s->set.q; i++)
     sum += fabs(part[i]) * qp_pricing_tolerance(&s->pricing, s->set.member[i], s->x);
-  return 2 * sum;
+  return noise(s, k) + 2 * sum;
 }
 
 /* The proof that no x exists: sign * (a_k - N part) = 0, while the sides ask for more than 0. */
@@ -242,7 +250,7 @@ static batten_status pivot(dual *s, size_t k, signed char side, bool *given_up) 
     }
     if (!depends) qp_active_combine(set, set->q, set->n, sign * t, s->d, s->x);
     for (size_t i = 0; i < set->q; i++) s->y[i] -= t * sign * s->part[i];
-    s->rise += t * square * (t / 2 + multiplier);
+    s->moved = s->moved || missing > noise(s, k);
     multiplier += t;
     if (leaves == SIZE_MAX) break;
     drop(s, leaves);
@@ -278,27 +286,25 @@ static batten_status pivot_candidates(dual *s, size_t most, size_t *pivots) {
 
 /* ---- Passes ---- */
 
-static double objective_value(const dual *s) {
-  double square = 0;
-  for (size_t i = 0; i < s->set.q; i++) {
-    double sum = 0; /* (u - Q'c)_i = (T y)_i */
-    for (size_t l = i; l < s->set.q; l++) sum += s->set.t[i + l * s->set.n] * s->y[l];
-    square += sum * sum;
-  }
-  return square / 2;
-}
-
 static bool all_finite(size_t n, const double *x) { return batten_first_nonfinite(n, x) == n; }
 
+/* Several times the pivots that problems of the size take. */
+static size_t many_pivots(const dual *s) {
+  size_t n = s->set.n, m = s->rows->m;
+  return 500 + 10 * (n + (m < n ? m : n));
+}
+
 static batten_status run_passes(dual *s) {
-  bool refined = false;
-  const double LOOSEST = 1e-11; /* below what the tolerances of callers may sensibly ask for */
+  const size_t STALLS = 8;                  /* passes in a row without a step beyond rounding */
+  const double LOUDEST = 1e5 * DBL_EPSILON; /* above, rounding cannot be what goes in circles */
   size_t n = s->set.n, stalls = 0, accurate = 4 * n;
+  size_t many = s->point->iterations + many_pivots(s);
+  bool refined = false;
   for (;;) {
-    if (!all_finite(n, s->x)) return BATTEN_W_ACCURACY;
+    if (!all_finite(n, s->x) || s->noise > LOUDEST) return BATTEN_W_ACCURACY;
     size_t pivots = 0;
-    if (qp_pricing_pass(s->ctx, &s->pricing, s->x)) {
-      s->rise = 0;
+    s->moved = false;
+    if (stalls < 2 * STALLS && qp_pricing_pass(s->ctx, &s->pricing, s->x)) {
       batten_status st = pivot_candidates(s, 2 * n + 64, &pivots);
       if (st < 0) return st;
     }
@@ -308,15 +314,13 @@ static batten_status run_passes(dual *s) {
       refine(s);
       continue;
     }
-
-    /* Steps that no longer raise the objective: rounding leads in circles. Violations of its size are then let be. */
-    if (pivots > 0 && s->rise <= DBL_EPSILON * objective_value(s)) stalls++;
-    if (stalls == 16) {
-      stalls = 0;
-      s->pricing.feasibility *= 16;
-      if (s->pricing.feasibility > LOOSEST) return BATTEN_W_ACCURACY;
+    stalls = s->moved ? 0 : stalls + 1;
+    bool too_many = s->point->iterations > many;
+    if (too_many) {
+      s->noise *= 16;
+      many += many_pivots(s);
     }
-    if (pivots == 0 || s->updates > 4 * accurate || stalls == 8) {
+    if (pivots == 0 || too_many || s->updates > 4 * accurate || stalls == STALLS) {
       batten_status st = refactor(s);
       if (st < 0) return st;
     } else {
@@ -342,7 +346,13 @@ static batten_status prepare(dual *s, double **memory) {
 
 batten_status qp_dual(batten_context *ctx, const qp_dense *objective, const qp_rows *rows, const qp_limits *limits,
                       qp_point *point) {
-  dual s = {.ctx = ctx, .objective = objective, .rows = rows, .limits = limits, .point = point, .x = point->x};
+  dual s = {.ctx = ctx,
+            .objective = objective,
+            .rows = rows,
+            .limits = limits,
+            .point = point,
+            .x = point->x,
+            .noise = 4 * DBL_EPSILON};
   double *memory = NULL;
   point->have_x = false;
   batten_status st = prepare(&s, &memory);
