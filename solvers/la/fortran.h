@@ -53,6 +53,7 @@ void FORTRAN(dsymv)(CH uplo, IN n, const double *alpha, const double *a, IN lda,
                     const double *beta, double *y, IN incy, LEN);
 
 /* LAPACK in double. */
+void FORTRAN(dpbtrf)(CH uplo, IN n, IN kd, double *ab, IN ldab, OUT info, LEN);
 void FORTRAN(dpstrf)(CH uplo, IN n, double *a, IN lda, OUT piv, OUT rank, const double *tol, double *work, OUT info,
                      LEN);
 void FORTRAN(dsytrf)(CH uplo, IN n, double *a, IN lda, OUT ipiv, double *work, IN lwork, OUT info, LEN);

@@ -110,6 +110,14 @@ size_t batten_la_potrf(batten_la_real real, char uplo, size_t n, void *a, size_t
   return (size_t)info;
 }
 
+size_t batten_la_pbtrf(char uplo, size_t n, size_t kd, double *ab, size_t ldab) {
+  if (n == 0) return 0;
+  batten_la_int ni = to_int(n), ki = to_int(kd), la = to_ld(ldab), info = 0;
+  FORTRAN(dpbtrf)(&uplo, &ni, &ki, ab, &la, &info, 1);
+  assert(info >= 0);
+  return (size_t)info;
+}
+
 batten_status batten_la_pstrf(batten_context *ctx, size_t n, double *a, size_t lda, double tolerance, size_t *pivots,
                               size_t *rank) {
   *rank = 0;

@@ -44,6 +44,9 @@ void batten_la_trsm(batten_la_real real, char side, char uplo, char trans, size_
 /* Cholesky. 0, or the 1-based order of the leading minor that is not positive. */
 size_t batten_la_potrf(batten_la_real real, char uplo, size_t n, void *a, size_t lda);
 
+/* Cholesky of a band matrix with kd diagonals beside the main one, in LAPACK's band storage; as potrf. */
+size_t batten_la_pbtrf(char uplo, size_t n, size_t kd, double *ab, size_t ldab);
+
 /* Cholesky with diagonal pivoting of a semidefinite matrix, upper triangle: P'AP = U'U with *rank rows of U, column j
  * of AP being column pivots[j] of A. Stops where the diagonal left is at most tolerance, but not before
  * the first pivot if that is positive; a negative tolerance stands for n eps / 2 times the largest. */

@@ -14,6 +14,9 @@
 
 #include "base/checked.h"
 
+/* Relative residuals of Newton systems: for a look ahead, and for a step to take. */
+static const double ROUGH = 1e-3, FINE = 1e-12;
+
 typedef struct ip {
   const qp_scaled *s;
   ip_newton newton;
@@ -117,7 +120,7 @@ static void weights(ip *p) {
 }
 
 /* The step that brings residuals to zero and v t to cl, cu beyond their present value: v dt + t dv = c. */
-static void step(ip *p) {
+static void step(ip *p, double enough) {
   const qp_scaled *s = p->s;
   for (size_t k = 0; k < s->m; k++) {
     double ql = -p->rl[k], qu = -p->ru[k], r = ql;
@@ -130,7 +133,7 @@ static void step(ip *p) {
     p->r2[k] = r;
   }
   for (size_t j = 0; j < s->n; j++) p->r1[j] = -p->rd[j];
-  p->error = ip_newton_solve(&p->newton, p->r1, p->r2, p->dx, p->dy);
+  p->error = ip_newton_solve(&p->newton, enough, p->r1, p->r2, p->dx, p->dy);
   qp_scaled_rows(s, p->dx, p->adx);
   for (size_t k = 0; k < s->m; k++) {
     double adx = p->adx[k], tl = p->tl[k], vl = p->vl[k], tu = p->tu[k], vu = p->vu[k];
@@ -228,7 +231,7 @@ static void start(ip *p) {
   }
   for (size_t j = 0; j < s->n; j++) p->r1[j] = -s->g[j];
   ip_newton_factor(&p->newton, 0, 0);
-  ip_newton_solve(&p->newton, p->r1, p->r2, p->x, p->y);
+  ip_newton_solve(&p->newton, FINE, p->r1, p->r2, p->x, p->y);
   qp_scaled_rows(s, p->x, p->ax);
   for (size_t k = 0; k < s->m; k++) {
     double y = p->y[k];
@@ -339,7 +342,7 @@ static void correct_centrality(ip *p, double target, double *a, double *b) {
     memcpy(p->kept_x, p->dx, bytes_n);
     memcpy(p->kept_rows, p->dy, bytes_m);
     aim_correct(p, target, fmin(1, (1 + FURTHER) * a0 + FURTHER), fmin(1, (1 + FURTHER) * b0 + FURTHER));
-    step(p);
+    step(p, FINE);
     longest(p, a, b);
     if (*a + *b >= a0 + b0 + WORTH) continue;
     *a = a0;
@@ -356,20 +359,23 @@ static void direction(ip *p, double *a, double *b) {
   weights(p);
   ip_newton_factor(&p->newton, 0, 0);
   aim_zero(p);
-  step(p);
+  step(p, ROUGH);
   if (p->error > TOO_WRONG) {
     ip_newton_factor(&p->newton, LEAST, LEAST);
-    step(p);
+    step(p, ROUGH);
   }
   longest(p, a, b);
-  if (p->sides == 0) return;
+  if (p->sides == 0) {
+    step(p, FINE);
+    return;
+  }
   double both = fmin(*a, *b), ratio = mu_after(p, both, both) / p->mu;
   double sigma = fmin(1, fmax(1e-8, ratio * ratio * ratio));
   /* Below what the gap asks for, products only lose digits while residuals are still on their way. */
   double least = 1e-4 * p->limits->tolerance * p->value_scale / (double)p->sides;
   double target = fmax(sigma * p->mu, least);
   aim_centre(p, target);
-  step(p);
+  step(p, FINE);
   longest(p, a, b);
   correct_centrality(p, target, a, b);
 }

@@ -36,8 +36,9 @@ batten_status ip_newton_new(batten_context *ctx, const qp_scaled *s, ip_newton *
 void ip_newton_free(batten_context *ctx, ip_newton *k);
 /* Factors with w as set; the factored system has at least rho_least and w_least, whatever rho and w are. */
 void ip_newton_factor(ip_newton *k, double rho_least, double w_least);
-/* dx [n], dy [m]; r1, r2 are kept. Refines until rounding. Returns the relative residual that is left. */
-double ip_newton_solve(ip_newton *k, const double *r1, const double *r2, double *dx, double *dy);
+/* dx [n], dy [m]; r1, r2 are kept. Refines until the residual is below enough of r, or as far as it goes. Returns
+ * what is left, relative. */
+double ip_newton_solve(ip_newton *k, double enough, const double *r1, const double *r2, double *dx, double *dy);
 
 /* Figures of x, y: y_k > 0 pushes from the lower side. scratch [n], [m]. */
 ip_figures ip_judge(const qp_scaled *s, const double *x, const double *y, double *scratch_n, double *scratch_m);

@@ -4,18 +4,22 @@
  *   [     C       -diag(w)  ] [p] = [s]      d >= 0, w > 0: quasidefinite, so that any symmetric order of pivots
  * exists
  *
- * with fixed H and C and new d, w in every step, factored as L D L' in an order of little fill (ldl.c). */
+ * with fixed H and C and new d, w in every step. Two ways, chosen by their cost:
+ *   bordered.c  x alone, banded: H + diag(d) + C' diag(1/w) C, with long rows and busy unknowns in a border
+ *   ldl.c       x and p together, any pattern: L D L' in an order of little fill */
 #ifndef BATTEN_QP_KKT_H
 #define BATTEN_QP_KKT_H
 
 #include "ordering.h"
 
 typedef struct qp_ldl qp_ldl;
+typedef struct qp_bordered qp_bordered;
 
 typedef struct qp_kkt {
   size_t n, m;
-  qp_ldl *ldl;
-  double flops; /* of a factorization, as estimated */
+  qp_ldl *ldl; /* one of the two, the other NULL */
+  qp_bordered *bordered;
+  double flops; /* of a factorization, in time of ldl.c's */
   size_t bytes; /* held */
 } qp_kkt;
 
@@ -34,5 +38,14 @@ size_t qp_ldl_factor(qp_ldl *f, const double *d, const double *w);
 void qp_ldl_solve(qp_ldl *f, double *r, double *s);
 double qp_ldl_flops(const qp_ldl *f);
 size_t qp_ldl_bytes(const qp_ldl *f);
+
+/* TOO_LARGE when a factorization takes more than most_flops, or the border gets too wide. */
+batten_status qp_bordered_new(batten_context *ctx, const qp_csr *h, const qp_csr *c, double most_flops,
+                              qp_bordered **out);
+void qp_bordered_free(batten_context *ctx, qp_bordered *f);
+size_t qp_bordered_factor(qp_bordered *f, const double *d, const double *w);
+void qp_bordered_solve(qp_bordered *f, double *r, double *s);
+double qp_bordered_flops(const qp_bordered *f);
+size_t qp_bordered_bytes(const qp_bordered *f);
 
 #endif

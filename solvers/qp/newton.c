@@ -31,7 +31,9 @@ void ip_newton_free(batten_context *ctx, ip_newton *k) {
 
 void ip_newton_factor(ip_newton *k, double rho_least, double w_least) {
   const qp_scaled *s = k->s;
+  const double CONDENSED = 1e-12; /* 1/w beyond this leaves too little of H in what is condensed */
   double rho = fmax(k->rho, rho_least);
+  if (k->kkt.bordered) w_least = fmax(w_least, CONDENSED);
   for (size_t j = 0; j < s->n; j++) k->d[j] = rho;
   for (size_t i = 0; i < s->general; i++) k->factored_w[i] = fmax(k->w[i], w_least);
   for (size_t i = s->general; i < s->m; i++) k->d[s->column[i - s->general]] += 1 / fmax(k->w[i], w_least);
@@ -138,9 +140,9 @@ static double krylov(ip_newton *k, const double *r1, const double *r2, double *d
   return residual(k, r1, r2, dx, dy);
 }
 
-double ip_newton_solve(ip_newton *k, const double *r1, const double *r2, double *dx, double *dy) {
+double ip_newton_solve(ip_newton *k, double enough, const double *r1, const double *r2, double *dx, double *dy) {
   const int ROUNDS = 8, CYCLES = 2;
-  const double ENOUGH = 1e-14, TOO_LARGE = 1e-9;
+  const double TOO_LARGE = fmax(1e-9, enough);
   const qp_scaled *s = k->s;
   size_t bytes_n = s->n * sizeof *dx, bytes_m = s->m * sizeof *dy;
   memset(dx, 0, bytes_n);
@@ -149,7 +151,7 @@ double ip_newton_solve(ip_newton *k, const double *r1, const double *r2, double 
   if (size == 0) return 0;
   bool slow = false;
   int cycles = 0;
-  for (int round = 0; round < ROUNDS && best > ENOUGH * size; round++) {
+  for (int round = 0; round < ROUNDS && best > enough * size; round++) {
     memcpy(k->best_x, dx, bytes_n);
     memcpy(k->best_y, dy, bytes_m);
     if (slow && (best <= TOO_LARGE * size || cycles == CYCLES)) break;

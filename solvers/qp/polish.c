@@ -51,7 +51,7 @@ static void solve(ip_newton *k, ip_polish_work *p) {
     double size = residuals(s, p);
     if (!(size < 0.5 * before)) break;
     before = size;
-    ip_newton_solve(k, p->r1, p->r2, p->dx, p->dy);
+    ip_newton_solve(k, 1e-14, p->r1, p->r2, p->dx, p->dy);
     for (size_t j = 0; j < s->n; j++) p->x[j] += p->dx[j];
     for (size_t i = 0; i < s->m; i++)
       if (p->tried[i]) p->y[i] += p->dy[i];
