@@ -122,6 +122,7 @@ static bool survey(qp_search *s) {
   size_t m = s->m, before = s->sighted, stops = m;
   size_t stretch = m / 64 < 32 ? 32 : m / 64 > 1024 ? 1024 : m / 64;
   double alpha = 1;
+  memset(s->most, 0, s->n * sizeof *s->most);
   qp_search_remember(s);
   bool all_hold = true;
   for (size_t first = 0; first < m; first += stretch) {
@@ -132,8 +133,7 @@ static bool survey(qp_search *s) {
       double by = outside(s, k, s->new_value[k]);
       if (by == 0) continue;
       all_hold = false;
-      if (s->is[k] & QP_SEEN) continue;
-      if (by > most) {
+      if (!(s->is[k] & QP_SEEN) && by > most) {
         most = by;
         worst = k;
       }

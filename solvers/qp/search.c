@@ -309,8 +309,15 @@ bool qp_search_meet(qp_search *s, batten_status *st) {
   size_t place, steps = 0;
   signed char side = QP_FREE;
   double by;
+  bool met = false;
   *st = BATTEN_OK;
-  while ((place = most_missed(s, &side, &by)) < s->sighted && *st == BATTEN_OK && steps++ < most_steps(s)) {
+  while (!met && *st == BATTEN_OK && steps++ < most_steps(s)) {
+    place = most_missed(s, &side, &by);
+    if (place == s->sighted) { /* as far as values tell that have gathered rounding */
+      met = s->since == 0;
+      if (!met) qp_search_refresh(s);
+      continue;
+    }
     dual_step(s, place, side, by);
     if (s->is[s->sight[place]] & QP_SKIPPED) break;
     *st = qp_search_pivot(s);
@@ -321,5 +328,5 @@ bool qp_search_meet(qp_search *s, batten_status *st) {
     memcpy(s->x, s->aim, s->n * sizeof *s->x);
   }
   forget_skipped(s);
-  return place == s->sighted && *st == BATTEN_OK && qp_search_wrong(s) == s->set.q;
+  return met && qp_search_wrong(s) == s->set.q;
 }
