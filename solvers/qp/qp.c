@@ -3,6 +3,7 @@
  * Engines are tried in the order of their estimated cost until the judge (certify.c) accepts a result or a proof.
  * What an engine says of itself counts for nothing: each point is mapped back to the caller's rows, judged there, and
  * kept when it is the best so far; the next engine starts from it and from its working set. */
+#include <float.h>
 #include <string.h>
 
 #include "base/checked.h"
@@ -86,6 +87,51 @@ static void judge(solver *s, const qp_point *point, batten_qp_info *info) {
   qp_certify_residuals(s->problem, point->x, s->y, s->work, info);
 }
 
+/* ---- The gap's last digits ---- */
+
+/* The objectives are sums of products y_k side_k of 1e8 and more, and rounding y alone moves them by 1e-8: of all
+ * multipliers that satisfy the equations equally well, few have no gap. So one multiplier is moved by what closes it.
+ * Rows have length one, so that the dual residual moves by gap / side_k at most: this returns the multiplier with the
+ * largest side (below the one given) that keeps its sign and is spaced finely enough to meet the gap. */
+static size_t gap_closer(const solver *s, double below, double allowed) {
+  const qp_rows *rows = &s->pre.rows;
+  size_t best = rows->m;
+  double largest = 0;
+  for (size_t k = 0; k < rows->m; k++) {
+    double y = s->best.y[k], side = fabs(y > 0 ? rows->lower[k] : rows->upper[k]);
+    if (y == 0 || !(side > largest && side < below) || !isfinite(side)) continue;
+    if (!qp_rows_is_equality(rows, k) && s->info.duality_gap / side > 0.5 * fabs(y)) continue;
+    if (DBL_EPSILON * fabs(y) * side > 0.5 * allowed) continue;
+    largest = side;
+    best = k;
+  }
+  return best;
+}
+
+static void close_gap(solver *s) {
+  enum { TRIES = 4 };
+  const qp_rows *rows = &s->pre.rows;
+  double side = INFINITY, allowed = s->o->tolerance_absolute + s->o->tolerance_relative * s->info.gap_scale;
+  if (!(against(s->info.primal_residual, s->info.primal_scale, s->o) <= 1) ||
+      !(against(s->info.dual_residual, s->info.dual_scale, s->o) <= 1))
+    return;
+  for (int attempt = 0; attempt < TRIES && s->info.duality_gap > allowed; attempt++) {
+    size_t k = gap_closer(s, side, allowed);
+    if (k == rows->m) return;
+    double y = s->best.y[k], gap = s->info.duality_gap;
+    side = fabs(y > 0 ? rows->lower[k] : rows->upper[k]);
+    bool closer = false;
+    for (int sign = -1; sign <= 1 && !closer; sign += 2) { /* which objective is the larger is not in info */
+      batten_qp_info info = s->info;
+      s->best.y[k] = y + sign * gap / side;
+      judge(s, &s->best, &info);
+      closer = info.duality_gap < 0.5 * gap && merit(&info, s->o) < merit(&s->info, s->o);
+      if (closer) s->info = info;
+    }
+    if (!closer) s->best.y[k] = y;
+  }
+}
+
 /* Keeps the point under way when it is better than the best so far. */
 static void consider(solver *s, batten_qp_engine engine) {
   size_t m = s->pre.rows.m;
@@ -101,6 +147,7 @@ static void consider(solver *s, batten_qp_engine engine) {
   memcpy(s->best.x, s->point.x, s->n * sizeof *s->best.x);
   memcpy(s->best.y, s->point.y, m * sizeof *s->best.y);
   memcpy(s->best.active, s->point.active, m);
+  close_gap(s);
 }
 
 static bool optimal(const solver *s) { return s->found && qp_certify_optimal(&s->info, s->o); }
