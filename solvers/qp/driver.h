@@ -33,6 +33,8 @@ batten_status qp_dense_solve(batten_context *ctx, qp_task *task, batten_qp_engin
 batten_status qp_dense_factor(batten_context *ctx, qp_task *task, double *ray);
 /* Asks for a larger rho; false when it is as large as makes sense. */
 bool qp_dense_damp(qp_task *task);
+/* Back to the least rho that the objective needs. */
+void qp_dense_undamp(batten_context *ctx, qp_task *task);
 void qp_task_free(batten_context *ctx, qp_task *task);
 
 /* refine.c: the minimiser on the working set point->active alone, by steps of conjugate gradients on the factor, with

@@ -28,8 +28,15 @@ void qp_task_free(batten_context *ctx, qp_task *task) {
 
 bool qp_dense_damp(qp_task *task) {
   const double STEP = 1000, MOST = 1e-1;
-  task->least_rho = fmax(STEP * task->rho, RHO);
-  return task->least_rho < MOST;
+  double more = fmax(STEP * task->rho, RHO);
+  if (more >= MOST) return false;
+  task->least_rho = more;
+  return true;
+}
+
+void qp_dense_undamp(batten_context *ctx, qp_task *task) {
+  if (task->least_rho > 0) qp_task_free(ctx, task);
+  task->least_rho = 0;
 }
 
 batten_status qp_dense_factor(batten_context *ctx, qp_task *task, double *ray) {

@@ -269,14 +269,6 @@ static batten_status run(solver *s, batten_qp_engine engine) {
   return st == BATTEN_E_UNBOUNDED ? try_unbounded(s) : BATTEN_OK;
 }
 
-/* A dense engine that gets stuck, or claims what it cannot prove, is tried again with more curvature. */
-static batten_status attempt(solver *s, batten_qp_engine engine) {
-  batten_status st = run(s, engine);
-  if (engine == BATTEN_QP_INTERIOR) return st;
-  while (st >= 0 && !finished(s) && s->task.r && qp_dense_damp(&s->task)) st = run(s, engine);
-  return st;
-}
-
 /* ---- The last digits ---- */
 
 static bool within(const solver *s, double level) {
@@ -295,28 +287,47 @@ static bool worth_trying(const solver *s, size_t i) {
   return i == 0 || s->plan.flops[i] <= CHEAP || !(merit(&s->info, s->o) <= NEAR);
 }
 
-/* The best point's working set, solved for outright; where that set is not yet the right one, a dense engine goes on
- * from it, if the caller lets engines help each other. */
-static batten_status polish(solver *s) {
+/* The best point's working set, solved for outright. *refused: it is not yet the set of a solution. */
+static batten_status polish(solver *s, bool *refused) {
   const size_t CHEAP = 300, MOST = 1000; /* unknowns for which it takes some 50 ms, a second */
   const double ENOUGH = 1e-12;
   double error;
+  *refused = false;
   if (!s->found || s->proof < 0 || s->stop < 0 || s->n == 0) return BATTEN_OK;
   if (at_rounding(s) || (optimal(s) && within(s, ENOUGH))) return BATTEN_OK;
-  if (!s->task.r && !s->o->hand_over) return BATTEN_OK;
+  if (s->info.engine == BATTEN_QP_INTERIOR && !s->o->hand_over) return BATTEN_OK;
   if (!s->plan.dense_affordable || s->n > (optimal(s) ? CHEAP : MOST)) return BATTEN_OK;
   batten_status st = qp_dense_factor(s->ctx, &s->task, s->point.ray);
   if (st < 0) return st == BATTEN_E_NOMEM ? st : BATTEN_OK;
   set_start(s);
   memcpy(s->point.y, s->best.y, s->pre.rows.m * sizeof *s->point.y);
-  batten_qp_engine engine = s->info.engine;
   st = qp_refine(s->ctx, &s->task, &s->point, &error);
   if (st < 0) return st == BATTEN_E_NOMEM ? st : BATTEN_OK;
-  if (error < INFINITY)
-    consider(s, engine);
-  else if (engine == BATTEN_QP_INTERIOR && s->o->hand_over)
-    return attempt(s, BATTEN_QP_DUAL);
+  *refused = !(error < INFINITY);
+  if (!*refused) consider(s, s->info.engine);
   return BATTEN_OK;
+}
+
+/* ---- One engine after the other ---- */
+
+/* A dense engine that gets stuck, or claims what it cannot prove, is tried again with more curvature; the interior
+ * point's working set, where it is not yet right, goes on in the dual engine if the caller lets engines help each
+ * other. */
+static batten_status attempt(solver *s, batten_qp_engine engine) {
+  bool refused;
+  batten_status st = run(s, engine);
+  if (st >= 0) st = polish(s, &refused);
+  if (engine == BATTEN_QP_INTERIOR) {
+    if (st < 0 || !refused) return st;
+    st = run(s, BATTEN_QP_DUAL);
+    return st >= 0 ? polish(s, &refused) : st;
+  }
+  while (st >= 0 && !finished(s) && !at_rounding(s) && s->task.r && qp_dense_damp(&s->task)) {
+    st = run(s, engine);
+    if (st >= 0) st = polish(s, &refused);
+  }
+  qp_dense_undamp(s->ctx, &s->task);
+  return st;
 }
 
 /* ---- Exactness, status ---- */
@@ -471,10 +482,7 @@ static batten_status solve(solver *s) {
   if (st < 0) return st;
   if (s->proof == BATTEN_OK) st = qp_choose(s->ctx, &s->task, s->o, false, &s->plan);
   s->setup_s = batten_now() - s->start;
-  for (size_t i = 0; st >= 0 && i < s->plan.count && worth_trying(s, i); i++) {
-    st = attempt(s, s->plan.engine[i]);
-    if (st >= 0) st = polish(s);
-  }
+  for (size_t i = 0; st >= 0 && i < s->plan.count && worth_trying(s, i); i++) st = attempt(s, s->plan.engine[i]);
   if (st >= 0) st = blend(s);
   if (st < 0) return st;
   s->info.not_convex_index = s->proof == BATTEN_E_NOT_CONVEX ? s->task.not_convex_index : s->n;
