@@ -250,7 +250,7 @@ void bx_write_qps(bx_writer *w, const batten_qp_file *file) {
   q.rows.ctx = q.columns.ctx = w->ctx;
   batten_status st = prepare(&q);
   if (st == BATTEN_OK) {
-    bx_put_text(w, "NAME ");
+    bx_put_text(w, file->name && *file->name ? "NAME " : "NAME");
     for (const char *c = file->name ? file->name : ""; *c; c++)
       bx_put_u8(w, (unsigned char)*c < ' ' ? '_' : (uint8_t)*c);
     bx_put_text(w, "\n");

@@ -1,4 +1,5 @@
-"""Quadratic programs in files, against SciPy's reader and writer of MATLAB's files. Prints TAP.
+"""Quadratic programs in files, against SciPy's reader and writer of MATLAB's files, and against HiGHS's of MPS and QPS
+where Python has it (highspy). Prints TAP.
 Usage: compare_qp_files.py PROGRAM      (PROGRAM: convert_qp FROM TO)
 The problems of the shared collection are read where it is there (environment BATTEN_SHARED)."""
 import glob
@@ -9,6 +10,10 @@ import sys
 import tempfile
 import time
 
+try:
+    import highspy
+except ImportError:
+    highspy = None
 try:
     import numpy as np
     import scipy.io
@@ -101,6 +106,47 @@ def random_problem(rng, n, m, bounds):
             "u": upper.reshape(-1, 1), "A": A, "n": n, "m": A.shape[0]}
 
 
+def highs_differs(path, document):
+    """What HiGHS reads otherwise from a QPS file; '' for nothing."""
+    highs = highspy.Highs()
+    highs.setOptionValue("output_flag", False)
+    if highs.readModel(path) != highspy.HighsStatus.kOk:
+        return "refused"
+    model = highs.getModel()
+    lp, hessian = model.lp_, model.hessian_
+    n, m = document["n"], len(document.get("lower", []))
+    format_of = sp.csc_matrix if lp.a_matrix_.format_ == highspy.MatrixFormat.kColwise else sp.csr_matrix
+    C = format_of((lp.a_matrix_.value_, lp.a_matrix_.index_, lp.a_matrix_.start_), shape=(m, n))
+    H = sp.tril(matrix(document.get("H"), (n, n)))
+    theirs = sp.csr_matrix((n, n)) if hessian.dim_ == 0 else sp.csc_matrix(
+        (hessian.value_, hessian.index_, hessian.start_), shape=(n, n))
+    pairs = {
+        "C": same(C, matrix(document.get("C"), (m, n))),
+        "H": same(theirs, H),
+        "g": np.array_equal(lp.col_cost_, document["g"]),
+        "constant": lp.offset_ == document["constant"],
+        "lower": np.array_equal(lp.row_lower_, side(document.get("lower"), m, -np.inf)),
+        "upper": np.array_equal(lp.row_upper_, side(document.get("upper"), m, np.inf)),
+        "x_lower": np.array_equal(lp.col_lower_, side(document.get("x_lower"), n, -np.inf)),
+        "x_upper": np.array_equal(lp.col_upper_, side(document.get("x_upper"), n, np.inf)),
+    }
+    return " ".join(name for name, equal in pairs.items() if not equal)
+
+
+def whole_document(rng, n, m):
+    """A document in small whole numbers, which no sum rounds, with sides of every kind; HiGHS writes no free rows."""
+    C = rng.integers(-4, 5, (m, n))
+    C[:, 0] = 1  # no empty row
+    F = rng.integers(-2, 3, (n, n))
+    lower = [None if rng.random() < 0.3 else int(v) for v in rng.integers(-9, 9, m)]
+    upper = [9 if low is None else None if rng.random() < 0.3 else low + int(rng.integers(0, 3)) for low in lower]
+    x_lower = [None if rng.random() < 0.4 else int(v) for v in rng.integers(-2, 2, n)]
+    x_upper = [None if rng.random() < 0.4 else (-1 if low is None else low + int(rng.integers(0, 3))) for low in x_lower]
+    return {"batten": "qp", "version": 1, "n": n, "H": (F @ F.T).tolist(), "g": rng.integers(-5, 6, n).tolist(),
+            "constant": int(rng.integers(-9, 9)), "C": C.tolist(), "lower": lower, "upper": upper, "x_lower": x_lower,
+            "x_upper": x_upper}
+
+
 with tempfile.TemporaryDirectory() as folder:
     rng = np.random.default_rng(7)
     for compressed in (False, True):
@@ -117,6 +163,28 @@ with tempfile.TemporaryDirectory() as folder:
             error = convert(source, target)
             wrong = error or differs(problem, json.load(open(target)))
             check(not wrong, f"the same with full matrices {wrong}")
+
+    if not highspy:
+        check(True, "QPS read and written by HiGHS # SKIP highspy is not there")
+    for n, m in ((3, 4), (12, 20), (30, 11)) if highspy else ():
+        document = whole_document(rng, n, m)
+        paths = [os.path.join(folder, name) for name in ("w.json", "w.mps", "highs.mps", "back.json")]
+        with open(paths[0], "w") as file:
+            json.dump(document, file)
+        wrong = convert(paths[0], paths[1]) or highs_differs(paths[1], document)
+        check(not wrong, f"HiGHS reads what is written: {n} unknowns, {m} rows {wrong}")
+        highs = highspy.Highs()
+        highs.setOptionValue("output_flag", False)
+        highs.readModel(paths[1])
+        highs.writeModel(paths[2])
+        wrong = convert(paths[2], paths[3])
+        back = {} if wrong else json.load(open(paths[3]))
+        for key in ("g", "constant", "lower", "upper", "x_lower", "x_upper") if back else ():
+            wrong += "" if back[key] == document[key] else key + " "
+        if back and not (same(matrix(back["H"], (n, n)), matrix(document["H"], (n, n)))
+                         and same(matrix(back["C"], (m, n)), matrix(document["C"], (m, n)))):
+            wrong += "H or C"
+        check(not wrong, f"what HiGHS writes is read {wrong}")
 
     files = sorted(glob.glob(os.path.join(os.environ.get("BATTEN_SHARED", "../shared"), "data", "qp", "*.mat")))
     if not files:
