@@ -294,6 +294,17 @@ static size_t many_pivots(const dual *s) {
   return 500 + 10 * (n + (m < n ? m : n));
 }
 
+/* Whether x misses its candidates by no more than what it is known to. */
+static bool within_noise(const dual *s) {
+  const qp_pricing *p = &s->pricing;
+  signed char side;
+  for (size_t i = 0; i < p->count; i++) {
+    size_t k = p->candidate[i];
+    if (qp_pricing_violation(p, k, qp_rows_dot(s->rows, k, s->x), s->x, &side) > noise(s, k)) return false;
+  }
+  return true;
+}
+
 static batten_status run_passes(dual *s) {
   const size_t STALLS = 8;                  /* passes in a row without a step beyond rounding */
   const double LOUDEST = 1e5 * DBL_EPSILON; /* above, rounding cannot be what goes in circles */
@@ -304,7 +315,8 @@ static batten_status run_passes(dual *s) {
     if (!all_finite(n, s->x) || s->noise > LOUDEST) return BATTEN_W_ACCURACY;
     size_t pivots = 0;
     s->moved = false;
-    if (stalls < 2 * STALLS && qp_pricing_pass(s->ctx, &s->pricing, s->x)) {
+    /* Steps within the noise are made once, for they may help; then they are not looked for again. */
+    if (stalls < 2 * STALLS && qp_pricing_pass(s->ctx, &s->pricing, s->x) && !(stalls > 0 && within_noise(s))) {
       batten_status st = pivot_candidates(s, 2 * n + 64, &pivots);
       if (st < 0) return st;
     }

@@ -514,6 +514,35 @@ static void test_equalities(batten_context *ctx) {
   }
 }
 
+/* Assignments: a linear objective with next to no curvature on a polytope whose vertices lie on twice the sides they
+ * need, where steps are lost in rounding. */
+static void test_assignments(batten_context *ctx) {
+  enum { k = 9, n = k * k };
+  for (uint64_t trial = 0; trial < 6; trial++) {
+    uint64_t seed = 400 + trial;
+    problem p = make_problem(n, 2 * k + n);
+    for (size_t i = 0; i < k; i++)
+      for (size_t j = 0; j < k; j++) {
+        size_t at = i * k + j;
+        p.dense[i * n + at] = p.dense[(k + j) * n + at] = 1;
+        p.dense[(2 * k + at) * n + at] = 1;
+        p.r[at * (n + 1)] = 1e-4 * (1 + t_uniform(&seed));
+        p.c[at] = -(double)(t_random(&seed) % 6) / p.r[at * (n + 1)]; /* small integers as costs: ties */
+      }
+    for (size_t i = 0; i < 2 * k; i++) p.lower[i] = p.upper[i] = 1;
+    qp_rows rows = rows_of(&p);
+    answer a = new_answer(&p);
+    run(ctx, &p, &rows, &a);
+    residuals r = judge(&p, &rows, &a);
+    T_CHECK(
+        a.status == BATTEN_OK && r.primal <= 1e-12 && r.dual <= 1e-13 && r.signs == 0 && a.point.iterations < 1000,
+        "assignment %llu: %s, primal %.2g dual %.2g gap %.2g, %zu pivots", (unsigned long long)trial,
+        batten_status_name(a.status), r.primal, r.dual, r.gap, a.point.iterations);
+    free_answer(&a);
+    free_problem(&p);
+  }
+}
+
 static void test_infeasible(batten_context *ctx) {
   problem two = make_problem(2, 2); /* x + y >= 1, x + y <= 0 */
   double rows2[4] = {1, 1, -3, -3};
@@ -621,6 +650,7 @@ int main(void) {
   test_collapsed_cone(ctx);
   test_degenerate_vertex(ctx);
   test_equalities(ctx);
+  test_assignments(ctx);
   test_infeasible(ctx);
   test_scales(ctx);
   test_limits(ctx);
