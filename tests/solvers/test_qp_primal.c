@@ -3,6 +3,7 @@
 #include <float.h>
 
 #include "qp/engine.h"
+#include "qp_scenes.h"
 #include "tap.h"
 
 /* A problem in its own memory: dense rows [m][n], brought to length 1 by scale. */
@@ -395,6 +396,42 @@ static void test_cancelled(void) {
   program_free(p);
 }
 
+/* A convex patch through the public call, stopped after each count of pivots: all right sides are 0, rows are many
+ * and nearly parallel, the start is strictly feasible. */
+static void test_patch(batten_context *ctx) {
+  enum { N = 48 };
+  qp_scene *s = qp_scene_patch(0, false, 7);
+  size_t wrong = 0, stops = 0, rises = 0;
+  double most = 0, last = INFINITY, optimum[2];
+  batten_qp_options o = batten_qp_options_default();
+  o.engine = BATTEN_QP_PRIMAL;
+  o.x0 = s->start;
+  for (batten_status st = BATTEN_W_STOPPED; st == BATTEN_W_STOPPED;) {
+    double x[N];
+    batten_qp_solution solution = {.x = x};
+    batten_qp_info info;
+    o.iteration_limit = ++stops;
+    st = batten_qp_solve(ctx, &s->problem, &o, NULL, &solution, &info);
+    wrong += st != BATTEN_OK && st != BATTEN_W_STOPPED ? 1 : 0;
+    for (size_t k = 0; k < s->c.rows; k++) {
+      double length = 0;
+      for (size_t j = 0; j < N; j++) length += s->c.dense[k * N + j] * s->c.dense[k * N + j];
+      most = fmax(most, -(double)qp_scene_dot(&s->c, k, x) / sqrt(length));
+    }
+    rises += info.objective > last * (1 + 1e-12) ? 1 : 0;
+    last = optimum[0] = info.objective;
+  }
+  T_CHECK(wrong == 0 && rises == 0 && stops > 10 && most <= 1e-14,
+          "convex patch stopped after each of %zu counts of pivots: %zu rises, rows off by %.1e", stops, rises, most);
+  batten_qp_info info;
+  o = batten_qp_options_default();
+  o.engine = BATTEN_QP_DUAL;
+  T_OK(batten_qp_solve(ctx, &s->problem, &o, NULL, NULL, &info), ctx);
+  optimum[1] = info.objective;
+  T_RATIO(fabs(optimum[0] / optimum[1] - 1), 1e-12, "objective beside the dual engine's");
+  qp_scene_free(s);
+}
+
 /* ---- Degenerate vertices ---- */
 
 /* min g'x + rho/2 |x|^2 over rows a x <= b and x >= 0, from x = 0. */
@@ -636,6 +673,7 @@ int main(void) {
   test_known(ctx);
   test_stopped(ctx);
   test_cancelled();
+  test_patch(ctx);
   test_cycling(ctx);
   test_degenerate(ctx);
   test_collapsed_cone(ctx);
