@@ -13,6 +13,7 @@
 
 #include "certify.h"
 #include "driver.h"
+#include "la/la.h"
 
 /* Against curvatures of the scaled objective, which are about 1: half of the digits for the curvature that is kept,
  * half for the steps without. */
@@ -134,12 +135,37 @@ static double pull(const loop *l) {
   return most > 0 ? most / size : 0;
 }
 
-/* Whether the step is a ray, once entries that are rounding are taken out. */
+/* ray -= (P + rho D^2)^-1 P ray until nothing changes: takes out what has curvature, by rho / (rho + curvature) each
+ * time. before and after are scratch. */
+static void straighten(const loop *l, double *ray) {
+  enum { TIMES = 60 };
+  const qp_task *task = l->task;
+  size_t n = task->rows->n;
+  double change = 1;
+  for (int time = 0; time < TIMES && change > DBL_EPSILON; time++) {
+    change = 0;
+    memset(l->before, 0, n * sizeof *l->before);
+    qp_objective_gradient(task->objective, l->before, l->after);
+    qp_objective_gradient(task->objective, ray, l->before);
+    for (size_t j = 0; j < n; j++) l->before[j] -= l->after[j];
+    batten_la_trsv(BATTEN_LA_DOUBLE, 'U', 'T', n, task->r, n, l->before);
+    batten_la_trsv(BATTEN_LA_DOUBLE, 'U', 'N', n, task->r, n, l->before);
+    for (size_t j = 0; j < n; j++) {
+      ray[j] -= l->before[j];
+      change = fmax(change, fabs(task->objective->metric[j] * l->before[j]));
+    }
+  }
+}
+
+/* Whether the step is a ray, once entries that are rounding are taken out, or what has curvature. */
 static bool is_ray(const loop *l, double *ray) {
   const qp_objective *o = l->task->objective;
   double most = 0;
   for (size_t j = 0; j < o->n; j++) most = fmax(most, fabs(o->metric[j] * l->step[j]));
   for (size_t j = 0; j < o->n; j++) ray[j] = fabs(o->metric[j] * l->step[j]) > 1e-9 * most ? l->step[j] : 0;
+  if (qp_certify_unbounded(l->task->problem, ray, l->before)) return true;
+  for (size_t j = 0; j < o->n; j++) ray[j] = l->step[j] / most;
+  straighten(l, ray);
   return qp_certify_unbounded(l->task->problem, ray, l->before);
 }
 
