@@ -196,7 +196,7 @@ void qp_summary(const qp_work *w) {
   cli_line("residuals", "primal %.1e, dual %.1e, gap %.1e, against %.1e, %.1e, %.1e", i->primal_residual,
            i->dual_residual, i->duality_gap, i->primal_scale, i->dual_scale, i->gap_scale);
   cli_line("active", "%zu of %zu constraints", i->rows_active, i->rows_used);
-  if (w->request->options.exact)
+  if (w->request->options.exact && w->status == BATTEN_OK)
     cli_line("exact", "every inequality holds exactly; x was moved by %.1e of the way", i->blend);
   cli_line("time", "%.3f s: solving %.3f, files %.3f", batten_now() - w->run.started, i->time_s,
            w->time_read_s + w->time_write_s);

@@ -123,6 +123,9 @@ check "inspect tells the engine" grep -Eq '^engine +(primal|dual|interior) would
 holds i.json bytes_predicted 'x > 100'
 holds i.json hessian_max 'x == 2'
 
+run 1 "p.qps: --time-limit: time is up" qp p.qps --time-limit 1e-9 --engine dual --report l.json
+is l.json status limit
+
 # ---- no solution: status 1, one line with the proof, solution and report written ----------------
 
 qp() { printf '{"batten": "qp", "version": 1, %s}' "$2" >"$1"; }
