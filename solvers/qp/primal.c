@@ -258,9 +258,8 @@ static batten_status refactor(qp_search *s) {
   return st;
 }
 
-/* Multipliers from what is left of the gradient at x, R'(Rx - c) - sum y_k a_k: on members, by one step of iterative
- * refinement. */
-static void refine_multipliers(qp_search *s) {
+/* d := J' of what is left of the gradient at the result, R'(Rx - c) - sum y_k a_k. */
+static void leftover(qp_search *s) {
   size_t n = s->n;
   const double *r = s->objective->r, *x = s->have_safe ? s->safe : s->x;
   for (size_t i = 0; i < n; i++) s->work[i] = -s->objective->target[i];
@@ -272,12 +271,27 @@ static void refine_multipliers(qp_search *s) {
   }
   for (size_t i = 0; i < s->set.q; i++) qp_rows_add(s->rows, s->set.member[i], -s->y[i], s->f);
   qp_active_project_vector(&s->set, s->f, s->d);
+}
+
+/* One step of iterative refinement: of x as far as rows allow, where it is worth a survey, then of the multipliers.
+ */
+static void refine(qp_search *s) {
+  leftover(s);
+  memset(s->p, 0, s->n * sizeof *s->p);
+  qp_active_combine(&s->set, s->set.q, s->n, -1, s->d, s->p);
+  double square = 0;
+  for (size_t j = 0; j < s->n; j++) square += s->p[j] * s->p[j];
+  if (s->have_safe && sqrt(square) > qp_search_error(s->n) * s->size) {
+    for (size_t j = 0; j < s->n; j++) s->x[j] = s->safe[j] + s->p[j];
+    survey(s);
+    leftover(s);
+  }
   qp_active_solve(&s->set, s->d, s->d);
   for (size_t i = 0; i < s->set.q; i++) s->y[i] += s->d[i];
 }
 
 static void write_result(qp_search *s, bool optimal) {
-  if (optimal) refine_multipliers(s);
+  if (optimal) refine(s);
   qp_point *point = s->point;
   point->have_x = s->have_safe;
   memcpy(point->x, s->have_safe ? s->safe : s->x, s->n * sizeof *point->x);

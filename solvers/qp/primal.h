@@ -80,8 +80,8 @@ void qp_search_see(qp_search *s, size_t k);
 void qp_search_refresh(qp_search *s);
 /* Slopes along p. */
 void qp_search_slopes(qp_search *s);
-/* x, values along p by alpha. Says whether that is a move beyond rounding. */
-bool qp_search_move(qp_search *s, double alpha);
+/* Moves x and values along p by alpha. */
+void qp_search_move(qp_search *s, double alpha);
 /* Moves x onto the members' sides. */
 void qp_search_return(qp_search *s);
 /* Adds the row at a place in sight, unless it depends on the members. */

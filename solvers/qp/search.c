@@ -91,7 +91,7 @@ void qp_search_slopes(qp_search *s) {
     s->slope[i] = s->is[s->sight[i]] & QP_MEMBER ? 0 : qp_rows_dot(s->rows, s->sight[i], s->p);
 }
 
-bool qp_search_move(qp_search *s, double alpha) {
+void qp_search_move(qp_search *s, double alpha) {
   double size = norm(s->n, s->x), length = alpha * norm(s->n, s->p);
   if (alpha > 0) {
     for (size_t j = 0; j < s->n; j++) s->x[j] += alpha * s->p[j];
@@ -99,9 +99,7 @@ bool qp_search_move(qp_search *s, double alpha) {
       if (!(s->is[s->sight[i]] & QP_MEMBER)) s->value[i] += alpha * s->slope[i];
     qp_search_remember(s);
   }
-  bool moved = length > qp_search_error(s->n) * size;
-  if (moved) s->stuck = 0;
-  return moved;
+  if (length > qp_search_error(s->n) * size) s->stuck = 0;
 }
 
 /* aim := aim + J1 T^-T (sides - N'aim): rounding in J then leaves the members where they belong. */
