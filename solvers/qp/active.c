@@ -27,7 +27,8 @@ static void axpy(size_t n, double factor, const double *restrict a, double *rest
 
 /* |a|, safe from overflow and underflow of squares. */
 static double norm(size_t n, const double *a) {
-  double most = 0, sum = 0;
+  double square = dot(n, a, a), most = 0, sum = 0;
+  if (square > 0x1p-900 && square < INFINITY) return sqrt(square);
   for (size_t i = 0; i < n; i++) most = fmax(most, fabs(a[i]));
   if (most == 0 || !isfinite(most)) return most;
   double unit = batten_unit(most);
@@ -114,12 +115,19 @@ void qp_active_project(const qp_active *set, size_t k, double *d) {
   }
 }
 
-void qp_active_combine(const qp_active *set, size_t first, size_t last, double factor, const double *u, double *x) {
-  if (set->n < WORTH_BLAS)
-    for (size_t j = first; j < last; j++) axpy(set->n, factor * u[j], set->j + j * set->n, x);
-  else
-    batten_la_gemv(BATTEN_LA_DOUBLE, 'N', set->n, last - first, factor, set->j + first * set->n, set->n, u + first, 1,
-                   x);
+void qp_active_combine(const qp_active *set, size_t first, size_t last, double factor, const double *u,
+                       double *restrict x) {
+  size_t n = set->n, j = first;
+  if (n >= WORTH_BLAS) {
+    batten_la_gemv(BATTEN_LA_DOUBLE, 'N', n, last - first, factor, set->j + first * n, n, u + first, 1, x);
+    return;
+  }
+  for (; j + 4 <= last; j += 4) { /* four columns for each time that x is loaded and stored */
+    const double *a = set->j + j * n, *b = a + n, *c = b + n, *d = c + n;
+    double p = factor * u[j], q = factor * u[j + 1], r = factor * u[j + 2], s = factor * u[j + 3];
+    for (size_t i = 0; i < n; i++) x[i] += (p * a[i] + q * b[i]) + (r * c[i] + s * d[i]);
+  }
+  for (; j < last; j++) axpy(n, factor * u[j], set->j + j * n, x);
 }
 
 void qp_active_solve(const qp_active *set, const double *d, double *y) {

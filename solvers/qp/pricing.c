@@ -9,7 +9,7 @@
 #include "base/checked.h"
 #include "la/la.h"
 
-enum { CANDIDATES = 128 };
+enum { CANDIDATES = 64 };
 
 /* A pass is over when the farthest candidate is below this share of the first one's distance: rows that are no
  * candidates are then likely to be farther. The dearer a pass is beside a pivot (m / n), the longer its candidates
@@ -26,14 +26,19 @@ static const double FEASIBILITY = 8 * DBL_EPSILON;
  * it. */
 static size_t block_rows(const qp_rows *rows) { return 8192 / (rows->n > 0 ? rows->n : 1); }
 
+/* Their weights cost as much as many pivots: fewer where there are few rows. */
+static size_t candidates_most(const qp_rows *rows) {
+  size_t part = rows->m / 8;
+  if (part < 16) part = rows->m < 16 ? rows->m : 16;
+  return part < CANDIDATES ? part : CANDIDATES;
+}
+
 /* As many chunks as candidates where there are rows enough, and more where a chunk would be larger than a block. */
 static size_t chunk_rows(const qp_rows *rows) {
-  size_t most = block_rows(rows), chunk = rows->m / CANDIDATES;
+  size_t most = block_rows(rows), offers = candidates_most(rows), chunk = offers > 0 ? rows->m / offers : 0;
   if (chunk > most) chunk = most;
   return chunk < 4 ? 4 : chunk;
 }
-
-static size_t candidates_most(const qp_rows *rows) { return rows->m < CANDIDATES ? rows->m : CANDIDATES; }
 
 /* Numbers that pricing keeps; false when they are too many to count. */
 static bool count_doubles(const qp_rows *rows, size_t chunks, size_t *doubles) {
