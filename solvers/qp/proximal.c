@@ -135,38 +135,62 @@ static double pull(const loop *l) {
   return most > 0 ? most / size : 0;
 }
 
-/* ray -= (P + rho D^2)^-1 P ray until nothing changes: takes out what has curvature, by rho / (rho + curvature) each
- * time. before and after are scratch. */
-static void straighten(const loop *l, double *ray) {
+/* out := (P + sum of a_k a_k' over the working set) ray. scratch [n]. */
+static void stiffness(const loop *l, const qp_point *point, const double *ray, double *scratch, double *out) {
+  const qp_rows *rows = l->task->rows;
+  size_t n = rows->n;
+  memset(out, 0, n * sizeof *out);
+  qp_objective_gradient(l->task->objective, out, scratch);
+  qp_objective_gradient(l->task->objective, ray, out);
+  for (size_t j = 0; j < n; j++) out[j] -= scratch[j];
+  for (size_t k = 0; k < rows->m; k++)
+    if (point->active[k] != QP_FREE) qp_rows_add(rows, k, qp_rows_dot(rows, k, ray), out);
+}
+
+/* ray -= (K + rho D^2)^-1 K ray until nothing changes, K = P + sum of a_k a_k' over the working set: takes out what
+ * has curvature and what leaves the working set, by rho / (rho + K) each time. before and after are scratch. */
+static batten_status straighten(batten_context *ctx, const loop *l, const qp_point *point, double *ray) {
   enum { TIMES = 60 };
   const qp_task *task = l->task;
   size_t n = task->rows->n;
-  double change = 1;
+  double change = 1, *row, *k = batten_alloc_array(ctx, n + 1, n * sizeof *k);
+  if (!k) return BATTEN_E_NOMEM;
+  row = k + n * n;
+  memset(k, 0, n * n * sizeof *k);
+  batten_la_syrk(BATTEN_LA_DOUBLE, 'U', 'T', n, n, 1, task->r, n, 0, k, n);
+  for (size_t q = 0; q < task->rows->m; q++) {
+    if (point->active[q] == QP_FREE) continue;
+    memset(row, 0, n * sizeof *row);
+    qp_rows_add(task->rows, q, 1, row);
+    batten_la_syrk(BATTEN_LA_DOUBLE, 'U', 'N', n, 1, 1, row, n, 1, k, n);
+  }
+  if (batten_la_potrf(BATTEN_LA_DOUBLE, 'U', n, k, n) != 0) change = 0;
   for (int time = 0; time < TIMES && change > DBL_EPSILON; time++) {
+    stiffness(l, point, ray, l->after, l->before);
+    batten_la_trsv(BATTEN_LA_DOUBLE, 'U', 'T', n, k, n, l->before);
+    batten_la_trsv(BATTEN_LA_DOUBLE, 'U', 'N', n, k, n, l->before);
     change = 0;
-    memset(l->before, 0, n * sizeof *l->before);
-    qp_objective_gradient(task->objective, l->before, l->after);
-    qp_objective_gradient(task->objective, ray, l->before);
-    for (size_t j = 0; j < n; j++) l->before[j] -= l->after[j];
-    batten_la_trsv(BATTEN_LA_DOUBLE, 'U', 'T', n, task->r, n, l->before);
-    batten_la_trsv(BATTEN_LA_DOUBLE, 'U', 'N', n, task->r, n, l->before);
     for (size_t j = 0; j < n; j++) {
       ray[j] -= l->before[j];
       change = fmax(change, fabs(task->objective->metric[j] * l->before[j]));
     }
   }
+  batten_free(ctx, k);
+  return BATTEN_OK;
 }
 
-/* Whether the step is a ray, once entries that are rounding are taken out, or what has curvature. */
-static bool is_ray(const loop *l, double *ray) {
+/* Whether the step is a ray, once entries that are rounding are taken out, or else what has curvature: E_UNBOUNDED.
+ */
+static batten_status judge_ray(batten_context *ctx, const loop *l, qp_point *point) {
   const qp_objective *o = l->task->objective;
-  double most = 0;
+  double most = 0, *ray = point->ray;
   for (size_t j = 0; j < o->n; j++) most = fmax(most, fabs(o->metric[j] * l->step[j]));
   for (size_t j = 0; j < o->n; j++) ray[j] = fabs(o->metric[j] * l->step[j]) > 1e-9 * most ? l->step[j] : 0;
-  if (qp_certify_unbounded(l->task->problem, ray, l->before)) return true;
+  if (qp_certify_unbounded(l->task->problem, ray, l->before)) return BATTEN_E_UNBOUNDED;
   for (size_t j = 0; j < o->n; j++) ray[j] = l->step[j] / most;
-  straighten(l, ray);
-  return qp_certify_unbounded(l->task->problem, ray, l->before);
+  batten_status st = straighten(ctx, l, point, ray);
+  if (st < 0) return st;
+  return qp_certify_unbounded(l->task->problem, ray, l->before) ? BATTEN_E_UNBOUNDED : BATTEN_OK;
 }
 
 /* ---- The loop ---- */
@@ -198,7 +222,8 @@ static batten_status rounds(batten_context *ctx, loop *l, qp_point *point) {
     }
     bool falls;
     next_center(l, point, &falls);
-    if (falls && is_ray(l, point->ray)) return BATTEN_E_UNBOUNDED;
+    if (falls) st = judge_ray(ctx, l, point);
+    if (st < 0) return st;
   }
   return BATTEN_W_ACCURACY;
 }
