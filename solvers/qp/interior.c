@@ -127,8 +127,8 @@ static void step(ip *p, double enough) {
     if (p->kind[k] & IP_LOWER) r = ql += p->cl[k] / p->vl[k];
     if (p->kind[k] & IP_UPPER) r = -(qu += p->cu[k] / p->vu[k]);
     if (p->kind[k] == IP_BOTH) {
-      double wl = p->tl[k] / p->vl[k] + p->delta, wu = p->tu[k] / p->vu[k] + p->delta;
-      r = ql * (wu / (wl + wu)) - qu * (wl / (wl + wu));
+      double wl = p->tl[k] / p->vl[k] + p->delta, wu = p->tu[k] / p->vu[k] + p->delta, sum = wl + wu;
+      r = ql * (wu / sum) - qu * (wl / sum);
     }
     p->r2[k] = r;
   }
@@ -335,7 +335,9 @@ static void regularize(ip *p, size_t count, double a, double b) {
  * by row lie one behind the other. */
 static void correct_centrality(ip *p, double target, double *a, double *b) {
   const int MOST = 3;
-  const double FURTHER = 0.08, LONG = 1.9, WORTH = 0.02;
+  const double FURTHER = 0.08, WORTH = 0.02;
+  /* Where a factorization costs little more than a solve, only what is really short is worth a corrector. */
+  const double LONG = p->newton.kkt.cheap ? 1.5 : 1.9;
   size_t bytes_n = p->s->n * sizeof(double), bytes_m = 6 * p->s->m * sizeof(double);
   for (int c = 0; c < MOST && *a + *b < LONG; c++) {
     double a0 = *a, b0 = *b;
@@ -383,15 +385,18 @@ static void direction(ip *p, double *a, double *b) {
 static batten_status iterate(batten_context *ctx, ip *p, size_t *count) {
   const size_t PATIENCE = 30; /* steps without a better point or smaller mu */
   size_t idle = 0;
-  double least_mu = INFINITY;
+  double mark = INFINITY, least_mu = INFINITY; /* of the last progress worth the name */
   double a = 0, b = 0;
   for (*count = 0;; ++*count) {
-    double before = p->have_best ? p->best.merit : INFINITY;
     residuals(p);
     keep_best(p);
     if (p->best.merit <= p->limits->tolerance) return BATTEN_OK;
-    idle = p->best.merit < 0.9 * before || p->mu < 0.5 * least_mu ? 0 : idle + 1;
-    least_mu = fmin(least_mu, p->mu);
+    idle++;
+    if (p->best.merit < 0.9 * mark || p->mu < 0.5 * least_mu) {
+      mark = fmin(mark, p->best.merit);
+      least_mu = fmin(least_mu, p->mu);
+      idle = 0;
+    }
     if (idle > PATIENCE || !isfinite(p->figures.merit)) return BATTEN_W_ACCURACY;
     batten_status st = qp_limits_check(ctx, p->limits, *count, 1 - 1 / (1 + 0.1 * (double)*count));
     if (st < 0) return st;
@@ -456,6 +461,7 @@ static void deliver(const ip *p, batten_status st, qp_point *point) {
 batten_status qp_interior(batten_context *ctx, const qp_sparse *objective, const qp_rows *rows,
                           const qp_limits *limits, qp_point *point) {
   const size_t POLISH_ROUNDS = 3;
+  const double POLISHED = 1e-15;
   qp_scaled s = {0};
   ip p = {.s = &s, .limits = limits};
   size_t count = 0;
@@ -468,7 +474,7 @@ batten_status qp_interior(batten_context *ctx, const qp_sparse *objective, const
     st = iterate(ctx, &p, &count);
     if (st >= 0) {
       guess(&p, p.best_x, p.best_y, p.ax, point->active);
-      p.best = ip_polish(&p.newton, &p.work, p.best, 0, p.best_x, p.best_y, point->active, POLISH_ROUNDS);
+      p.best = ip_polish(&p.newton, &p.work, p.best, POLISHED, p.best_x, p.best_y, point->active, POLISH_ROUNDS);
       if (p.best.merit <= limits->tolerance) st = BATTEN_OK;
     }
   }

@@ -5,19 +5,31 @@
 /* Sums that run along a band go this much faster than those through the indices of a sparse factor: measured. */
 static const double BAND_IS_FASTER = 4;
 
+static void take_band(qp_kkt *out, qp_bordered *band, bool cheap) {
+  out->bordered = band;
+  out->cheap = cheap;
+  out->flops = qp_bordered_flops(band) / BAND_IS_FASTER;
+  out->bytes = qp_bordered_bytes(band);
+}
+
 batten_status qp_kkt_new(batten_context *ctx, const qp_csr *h, const qp_csr *c, qp_kkt *out) {
+  const double FEW = 40; /* operations for each entry of the problem: no order of little fill gains on that */
+  double entries = (double)(h->starts[h->rows] + c->starts[c->rows] + c->columns + c->rows);
+  qp_bordered *band = NULL;
   *out = (qp_kkt){.n = c->columns, .m = c->rows};
-  batten_status st = qp_ldl_new(ctx, h, c, &out->ldl);
+  batten_status st = qp_bordered_new(ctx, h, c, FEW * entries, &band);
+  if (st >= 0) take_band(out, band, true);
+  if (st != BATTEN_E_TOO_LARGE) return st;
+  st = qp_ldl_new(ctx, h, c, &out->ldl);
   if (st < 0) return st;
   out->flops = qp_ldl_flops(out->ldl);
   out->bytes = qp_ldl_bytes(out->ldl);
-  st = qp_bordered_new(ctx, h, c, BAND_IS_FASTER * out->flops, &out->bordered);
+  st = qp_bordered_new(ctx, h, c, BAND_IS_FASTER * out->flops, &band);
   if (st == BATTEN_E_TOO_LARGE) return BATTEN_OK;
   if (st < 0) return st;
   qp_ldl_free(ctx, out->ldl);
   out->ldl = NULL;
-  out->flops = qp_bordered_flops(out->bordered) / BAND_IS_FASTER;
-  out->bytes = qp_bordered_bytes(out->bordered);
+  take_band(out, band, false);
   return BATTEN_OK;
 }
 

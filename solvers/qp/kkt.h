@@ -10,6 +10,8 @@
 #ifndef BATTEN_QP_KKT_H
 #define BATTEN_QP_KKT_H
 
+#include <stdbool.h>
+
 #include "ordering.h"
 
 typedef struct qp_ldl qp_ldl;
@@ -20,6 +22,7 @@ typedef struct qp_kkt {
   qp_ldl *ldl; /* one of the two, the other NULL */
   qp_bordered *bordered;
   double flops; /* of a factorization, in time of ldl.c's */
+  bool cheap;   /* a factorization costs little more than a solve */
   size_t bytes; /* held */
 } qp_kkt;
 
