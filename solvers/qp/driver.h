@@ -1,4 +1,4 @@
-/* The driver of quadratic programs, between its files: check.c, choose.c, proximal.c, refine.c, qp.c. */
+/* The driver of quadratic programs, between its files: check.c, choose.c, proximal.c, refine.c, digits.c, qp.c. */
 #ifndef BATTEN_QP_DRIVER_H
 #define BATTEN_QP_DRIVER_H
 
@@ -41,6 +41,11 @@ void qp_task_free(batten_context *ctx, qp_task *task);
  * residuals in twice the working precision. *error: its relative residuals; INFINITY, and the point untouched, where
  * it breaks other rows or signs by more than rounding, or is not found. */
 batten_status qp_refine(batten_context *ctx, const qp_task *task, qp_point *point, double *error);
+
+/* digits.c: other doubles next to x [n] and y [m + n] of the caller, that meet the tolerances better; info is theirs
+ * then. work [3 n]. */
+void qp_last_digits(const batten_qp_problem *problem, const batten_qp_options *o, double *x, double *y, double *work,
+                    batten_qp_info *info);
 
 /* choose.c: engines in the order in which they are to be tried, by estimated cost. exactly: bytes count the interior
  * point even where it is only the last resort; that takes an ordering of the unknowns. */

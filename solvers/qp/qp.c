@@ -3,7 +3,6 @@
  * Engines are tried in the order of their estimated cost until the judge (certify.c) accepts a result or a proof.
  * What an engine says of itself counts for nothing: each point is mapped back to the caller's rows, judged there, and
  * kept when it is the best so far; the next engine starts from it and from its working set. */
-#include <float.h>
 #include <string.h>
 
 #include "base/checked.h"
@@ -39,10 +38,11 @@ typedef struct solver {
   bool found;          /* there is a best */
   batten_status proof; /* E_INFEASIBLE, E_UNBOUNDED, E_NOT_CONVEX once proven, else BATTEN_OK */
   batten_status stop;  /* E_LIMIT, E_CANCELLED once met, else BATTEN_OK */
+  bool settled;        /* y holds the multipliers of best, which best.y only comes near to */
   bool inexact;        /* exact was asked for and could not be had */
   double *y;           /* [m + n] multipliers of the caller; the certificate of E_INFEASIBLE */
   signed char *active; /* [m + n] working set of the caller */
-  double *work;        /* [2 n] */
+  double *work;        /* [3 n] */
   double start, setup_s;
   batten_qp_info info;
 } solver;
@@ -87,51 +87,6 @@ static void judge(solver *s, const qp_point *point, batten_qp_info *info) {
   qp_certify_residuals(s->problem, point->x, s->y, s->work, info);
 }
 
-/* ---- The gap's last digits ---- */
-
-/* The objectives are sums of products y_k side_k of 1e8 and more, and rounding y alone moves them by 1e-8: of all
- * multipliers that satisfy the equations equally well, few have no gap. So one multiplier is moved by what closes it.
- * Rows have length one, so that the dual residual moves by gap / side_k at most: this returns the multiplier with the
- * largest side (below the one given) that keeps its sign and is spaced finely enough to meet the gap. */
-static size_t gap_closer(const solver *s, double below, double allowed) {
-  const qp_rows *rows = &s->pre.rows;
-  size_t best = rows->m;
-  double largest = 0;
-  for (size_t k = 0; k < rows->m; k++) {
-    double y = s->best.y[k], side = fabs(y > 0 ? rows->lower[k] : rows->upper[k]);
-    if (y == 0 || !(side > largest && side < below) || !isfinite(side)) continue;
-    if (!qp_rows_is_equality(rows, k) && s->info.duality_gap / side > 0.5 * fabs(y)) continue;
-    if (DBL_EPSILON * fabs(y) * side > 0.5 * allowed) continue;
-    largest = side;
-    best = k;
-  }
-  return best;
-}
-
-static void close_gap(solver *s) {
-  enum { TRIES = 4 };
-  const qp_rows *rows = &s->pre.rows;
-  double side = INFINITY, allowed = s->o->tolerance_absolute + s->o->tolerance_relative * s->info.gap_scale;
-  if (!(against(s->info.primal_residual, s->info.primal_scale, s->o) <= 1) ||
-      !(against(s->info.dual_residual, s->info.dual_scale, s->o) <= 1))
-    return;
-  for (int attempt = 0; attempt < TRIES && s->info.duality_gap > allowed; attempt++) {
-    size_t k = gap_closer(s, side, allowed);
-    if (k == rows->m) return;
-    double y = s->best.y[k], gap = s->info.duality_gap;
-    side = fabs(y > 0 ? rows->lower[k] : rows->upper[k]);
-    bool closer = false;
-    for (int sign = -1; sign <= 1 && !closer; sign += 2) { /* which objective is the larger is not in info */
-      batten_qp_info info = s->info;
-      s->best.y[k] = y + sign * gap / side;
-      judge(s, &s->best, &info);
-      closer = info.duality_gap < 0.5 * gap && merit(&info, s->o) < merit(&s->info, s->o);
-      if (closer) s->info = info;
-    }
-    if (!closer) s->best.y[k] = y;
-  }
-}
-
 /* Keeps the point under way when it is better than the best so far. */
 static void consider(solver *s, batten_qp_engine engine) {
   size_t m = s->pre.rows.m;
@@ -147,7 +102,6 @@ static void consider(solver *s, batten_qp_engine engine) {
   memcpy(s->best.x, s->point.x, s->n * sizeof *s->best.x);
   memcpy(s->best.y, s->point.y, m * sizeof *s->best.y);
   memcpy(s->best.active, s->point.active, m);
-  close_gap(s);
 }
 
 static bool optimal(const solver *s) { return s->found && qp_certify_optimal(&s->info, s->o); }
@@ -330,6 +284,19 @@ static batten_status attempt(solver *s, batten_qp_engine engine) {
   return st;
 }
 
+/* Where only rounding keeps the best point from the tolerances: the doubles next to it, if they meet them. */
+static void settle(solver *s) {
+  if (!s->found || s->proof < 0 || s->n == 0 || s->o->exact || optimal(s)) return;
+  batten_qp_info info = s->info;
+  memcpy(s->point.x, s->best.x, s->n * sizeof *s->point.x);
+  qp_presolve_back(&s->pre, s->best.y, s->best.active, s->y, s->active);
+  qp_last_digits(s->problem, s->o, s->point.x, s->y, s->work, &info);
+  if (!qp_certify_optimal(&info, s->o)) return;
+  memcpy(s->best.x, s->point.x, s->n * sizeof *s->best.x);
+  s->info = info;
+  s->settled = true;
+}
+
 /* ---- Exactness, status ---- */
 
 static batten_status blend(solver *s) {
@@ -407,7 +374,7 @@ static batten_status set_up(solver *s) {
   if (!s->y) return BATTEN_E_NOMEM;
   s->active = batten_alloc_array(s->ctx, s->m + s->n, sizeof *s->active);
   if (!s->active) return BATTEN_E_NOMEM;
-  s->work = batten_alloc_array(s->ctx, s->n, 2 * sizeof *s->work);
+  s->work = batten_alloc_array(s->ctx, s->n, 3 * sizeof *s->work);
   if (!s->work) return BATTEN_E_NOMEM;
   batten_status st = qp_check_structure(s->ctx, s->problem);
   if (st == BATTEN_OK) st = batten_progress(s->ctx, "quadratic program", 0);
@@ -458,7 +425,7 @@ static void deliver(solver *s, batten_status st, batten_qp_solution *out) {
   size_t all = s->m + s->n;
   s->info.rows_active = 0;
   if (st >= 0) {
-    qp_presolve_back(&s->pre, s->best.y, s->best.active, s->y, s->active);
+    if (!s->settled) qp_presolve_back(&s->pre, s->best.y, s->best.active, s->y, s->active);
     for (size_t i = 0; i < all; i++) s->info.rows_active += s->active[i] != QP_FREE;
   }
   if (!out) return;
@@ -482,7 +449,10 @@ static batten_status solve(solver *s) {
   if (st < 0) return st;
   if (s->proof == BATTEN_OK) st = qp_choose(s->ctx, &s->task, s->o, false, &s->plan);
   s->setup_s = batten_now() - s->start;
-  for (size_t i = 0; st >= 0 && i < s->plan.count && worth_trying(s, i); i++) st = attempt(s, s->plan.engine[i]);
+  for (size_t i = 0; st >= 0 && i < s->plan.count && worth_trying(s, i); i++) {
+    st = attempt(s, s->plan.engine[i]);
+    if (st >= 0) settle(s);
+  }
   if (st >= 0) st = blend(s);
   if (st < 0) return st;
   s->info.not_convex_index = s->proof == BATTEN_E_NOT_CONVEX ? s->task.not_convex_index : s->n;
