@@ -38,7 +38,7 @@ static inline double qp_trial_allowed(const qp_scene_spec *spec, const qp_verdic
 
 static inline qp_trial_result qp_trial_judge(const qp_scene_spec *spec, const qp_scene *s, batten_qp_engine engine,
                                              batten_status status, const double *x, const double *y) {
-  const size_t HANDED_OVER = 300;
+  const size_t HANDED_OVER = 100;
   qp_trial_result r = {.status = status, .primal = INFINITY, .dual = INFINITY, .gap = INFINITY, .off = INFINITY};
   if (status != BATTEN_OK && status != BATTEN_W_ACCURACY) return r;
   r.verdict = qp_check(&s->problem, x, y);

@@ -183,6 +183,7 @@ static batten_status try_unbounded(solver *s) {
     if (st == BATTEN_E_INFEASIBLE) try_infeasible(s);
     if (s->proof < 0) return BATTEN_OK;
     memset(s->point.y, 0, s->pre.rows.m * sizeof *s->point.y);
+    s->found = false; /* whatever its merit: feasible is all that counts now */
     consider(s, BATTEN_QP_INTERIOR);
   }
   if (s->proof == BATTEN_OK && feasible(s)) s->proof = BATTEN_E_UNBOUNDED;
@@ -243,12 +244,12 @@ static bool worth_trying(const solver *s, size_t i) {
 
 /* The best point's working set, solved for outright. *refused: it is not yet the set of a solution. */
 static batten_status polish(solver *s, bool *refused) {
-  const size_t CHEAP = 300, MOST = 1000; /* unknowns for which it takes some 50 ms, a second */
+  const size_t SMALL = 100, CHEAP = 300, MOST = 1000; /* unknowns for which it takes some 2 ms, 50 ms, a second */
   const double ENOUGH = 1e-12;
   double error;
   *refused = false;
   if (!s->found || s->proof < 0 || s->stop < 0 || s->n == 0) return BATTEN_OK;
-  if (at_rounding(s) || (optimal(s) && within(s, ENOUGH))) return BATTEN_OK;
+  if (at_rounding(s) || (optimal(s) && s->n > SMALL && within(s, ENOUGH))) return BATTEN_OK;
   if (s->info.engine == BATTEN_QP_INTERIOR && !s->o->hand_over) return BATTEN_OK;
   if (!s->plan.dense_affordable || s->n > (optimal(s) ? CHEAP : MOST)) return BATTEN_OK;
   batten_status st = qp_dense_factor(s->ctx, &s->task, s->point.ray);
