@@ -11,7 +11,7 @@
 #include "base/checked.h"
 #include "ordering.h"
 
-enum { NONE = UINT32_MAX };
+static const uint32_t NONE = UINT32_MAX;
 
 typedef struct quotient {
   size_t n, left;         /* nodes, those not eliminated */

@@ -101,20 +101,18 @@ static void residuals(ip *p) {
 static void weights(ip *p) {
   double *w = p->newton.w;
   for (size_t k = 0; k < p->s->m; k++) {
-    double wl = p->tl[k] / p->vl[k] + p->delta, wu = p->tu[k] / p->vu[k] + p->delta;
+    double wl = p->kind[k] & IP_LOWER ? p->tl[k] / p->vl[k] + p->delta : 0;
+    double wu = p->kind[k] & IP_UPPER ? p->tu[k] / p->vu[k] + p->delta : 0;
     switch (p->kind[k]) {
       case IP_EQUAL:
         w[k] = p->delta;
         break;
-      case IP_LOWER:
-        w[k] = wl;
-        break;
-      case IP_UPPER:
-        w[k] = wu;
-        break;
-      default:
+      case IP_BOTH:
         w[k] = wl * (wu / (wl + wu));
         break;
+      default:
+        w[k] = wl + wu;
+        break; /* the other is 0 */
     }
   }
 }

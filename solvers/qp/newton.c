@@ -58,6 +58,21 @@ static double residual(ip_newton *k, const double *r1, const double *r2, const d
   return size;
 }
 
+/* The same at dx = 0, dy = 0. */
+static double start_residual(ip_newton *k, const double *r1, const double *r2) {
+  const qp_scaled *s = k->s;
+  double size = 0;
+  for (size_t j = 0; j < s->n; j++) {
+    k->q1[j] = r1[j];
+    size = fmax(size, fabs(r1[j]));
+  }
+  for (size_t i = 0; i < s->m; i++) {
+    k->q2[i] = r2[i];
+    size = fmax(size, fabs(r2[i]) / fmax(1, k->w[i]));
+  }
+  return size;
+}
+
 /* Adds the factored system's solution for q. */
 static void correct(ip_newton *k, double *dx, double *dy) {
   const qp_scaled *s = k->s;
@@ -147,7 +162,7 @@ double ip_newton_solve(ip_newton *k, double enough, const double *r1, const doub
   size_t bytes_n = s->n * sizeof *dx, bytes_m = s->m * sizeof *dy;
   memset(dx, 0, bytes_n);
   memset(dy, 0, bytes_m);
-  double size = residual(k, r1, r2, dx, dy), best = size;
+  double size = start_residual(k, r1, r2), best = size;
   if (size == 0) return 0;
   bool slow = false;
   int cycles = 0;

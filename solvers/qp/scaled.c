@@ -58,12 +58,12 @@ static void largest(const qp_scaled *s, double *of_unknown, double *of_row) {
   }
 }
 
-/* The power of two next to 1 / sqrt(x), x > 0. */
+/* A power of two within a factor 2 of 1 / sqrt(x), x > 0. */
 static double inverse_root(double x) {
-  int exponent;
-  double part = frexp(x, &exponent); /* x = part 2^exponent, part in [1/2, 1) */
-  double root = log2(part) / 2 + exponent / 2.0;
-  return ldexp(1, -(int)lrint(root));
+  int exponent; /* x = part 2^exponent, part in [1/2, 1) */
+  frexp(x, &exponent);
+  int half = exponent >= 0 ? exponent / 2 : -((1 - exponent) / 2);
+  return ldexp(1, -half);
 }
 
 static void equilibrate(qp_scaled *s, double *of_unknown, double *of_row) {
