@@ -110,21 +110,23 @@ static bool finished(const solver *s) { return optimal(s) || s->proof < 0 || s->
 
 /* ---- One engine ---- */
 
-/* Where the next attempt starts: the best so far if it is any good, or what the caller gave. */
-static void set_start(solver *s) {
+/* Where a run starts: at what the caller gave, at the best so far, or with an empty working set: an engine that got
+ * stuck from one may get through from the other. */
+typedef enum start { GIVEN, BEST, COLD } start;
+
+static void set_start(solver *s, start from) {
   size_t n = s->n, m = s->pre.rows.m;
-  bool good = s->found && (feasible(s) || s->info.primal_residual <= 1e-3 * s->info.primal_scale);
   memset(s->point.y, 0, m * sizeof *s->point.y);
   memset(s->point.active, QP_FREE, m);
-  if (good) {
+  memset(s->point.x, 0, n * sizeof *s->point.x);
+  s->point.have_x = from == BEST || s->o->x0;
+  if (from == BEST) {
     memcpy(s->point.x, s->best.x, n * sizeof *s->point.x);
     memcpy(s->point.active, s->best.active, m);
-  } else {
-    memset(s->point.x, 0, n * sizeof *s->point.x);
-    if (s->o->x0) memcpy(s->point.x, s->o->x0, n * sizeof *s->point.x);
-    if (s->o->active) qp_presolve_forward(&s->pre, s->o->active, s->point.active);
+  } else if (s->o->x0) {
+    memcpy(s->point.x, s->o->x0, n * sizeof *s->point.x);
   }
-  s->point.have_x = good || s->o->x0;
+  if (from == GIVEN && s->o->active) qp_presolve_forward(&s->pre, s->o->active, s->point.active);
 }
 
 static batten_status run_interior(solver *s) {
@@ -173,7 +175,7 @@ static batten_status try_unbounded(solver *s) {
       batten_matrix identity = batten_matrix_sparse(n, n, starts, s->pre.rows.identity, ones);
       nearest.h = &identity;
       nearest.g = ones + n;
-      set_start(s);
+      set_start(s, COLD);
       st = qp_interior(s->ctx, &nearest, &s->pre.rows, &s->task.limits, &s->point);
     }
     batten_free(s->ctx, ones);
@@ -191,9 +193,9 @@ static batten_status try_unbounded(solver *s) {
 }
 
 /* One run of an engine, and what becomes of its word. Fails only where going on makes no sense. */
-static batten_status run(solver *s, batten_qp_engine engine) {
+static batten_status run(solver *s, batten_qp_engine engine, start from) {
   batten_status st = BATTEN_OK;
-  set_start(s);
+  set_start(s, from);
   if (s->n > 0)
     st = engine == BATTEN_QP_INTERIOR ? run_interior(s) : qp_dense_solve(s->ctx, &s->task, engine, &s->point);
   switch (st) {
@@ -254,7 +256,7 @@ static batten_status polish(solver *s, bool *refused) {
   if (!s->plan.dense_affordable || s->n > (optimal(s) ? CHEAP : MOST)) return BATTEN_OK;
   batten_status st = qp_dense_factor(s->ctx, &s->task, s->point.ray);
   if (st < 0) return st == BATTEN_E_NOMEM ? st : BATTEN_OK;
-  set_start(s);
+  set_start(s, BEST);
   memcpy(s->point.y, s->best.y, s->pre.rows.m * sizeof *s->point.y);
   st = qp_refine(s->ctx, &s->task, &s->point, &error);
   if (st < 0) return st == BATTEN_E_NOMEM ? st : BATTEN_OK;
@@ -268,17 +270,17 @@ static batten_status polish(solver *s, bool *refused) {
 /* A dense engine that gets stuck, or claims what it cannot prove, is tried again with more curvature; the interior
  * point's working set, where it is not yet right, goes on in the dual engine if the caller lets engines help each
  * other. */
-static batten_status attempt(solver *s, batten_qp_engine engine) {
+static batten_status attempt(solver *s, batten_qp_engine engine, start from) {
   bool refused;
-  batten_status st = run(s, engine);
+  batten_status st = run(s, engine, from);
   if (st >= 0) st = polish(s, &refused);
   if (engine == BATTEN_QP_INTERIOR) {
     if (st < 0 || !refused) return st;
-    st = run(s, BATTEN_QP_DUAL);
+    st = run(s, BATTEN_QP_DUAL, BEST);
     return st >= 0 ? polish(s, &refused) : st;
   }
   while (st >= 0 && !finished(s) && !at_rounding(s) && s->task.r && qp_dense_damp(&s->task)) {
-    st = run(s, engine);
+    st = run(s, engine, COLD);
     if (st >= 0) st = polish(s, &refused);
   }
   qp_dense_undamp(s->ctx, &s->task);
@@ -451,7 +453,7 @@ static batten_status solve(solver *s) {
   if (s->proof == BATTEN_OK) st = qp_choose(s->ctx, &s->task, s->o, false, &s->plan);
   s->setup_s = batten_now() - s->start;
   for (size_t i = 0; st >= 0 && i < s->plan.count && worth_trying(s, i); i++) {
-    st = attempt(s, s->plan.engine[i]);
+    st = attempt(s, s->plan.engine[i], i == 0 ? GIVEN : COLD);
     if (st >= 0) settle(s);
   }
   if (st >= 0) st = blend(s);
