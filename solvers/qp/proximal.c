@@ -118,7 +118,7 @@ static void next_center(loop *l, const qp_point *point, bool *falls) {
     bool flat = curvature <= 1e-10 * squares; /* below what rho lets through, above rounding */
     *falls = flat && way >= 1e12;
     t = fmin(flat ? way : -slope / curvature, way);
-    if (*falls) t = 100; /* where that is no ray, a longer step tells more */
+    if (*falls) t = 0; /* where that is not yet a ray, the next step has rho of the curvature that this one has */
   }
   for (size_t j = 0; j < n; j++) l->center[j] = point->x[j] + t * l->step[j];
 }
@@ -190,6 +190,8 @@ static batten_status judge_ray(batten_context *ctx, const loop *l, qp_point *poi
   for (size_t j = 0; j < o->n; j++) ray[j] = l->step[j] / most;
   batten_status st = straighten(ctx, l, point, ray);
   if (st < 0) return st;
+  for (size_t j = 0; j < o->n; j++)
+    if (fabs(o->metric[j] * ray[j]) <= (double)o->n * DBL_EPSILON) ray[j] = 0;
   return qp_certify_unbounded(l->task->problem, ray, l->before) ? BATTEN_E_UNBOUNDED : BATTEN_OK;
 }
 

@@ -112,9 +112,9 @@ static bool finished(const solver *s) { return optimal(s) || s->proof < 0 || s->
 
 /* Where a run starts: at what the caller gave, at the best so far, or with an empty working set: an engine that got
  * stuck from one may get through from the other. */
-typedef enum start { GIVEN, BEST, COLD } start;
+typedef enum beginning { GIVEN, BEST, COLD } beginning;
 
-static void set_start(solver *s, start from) {
+static void set_start(solver *s, beginning from) {
   size_t n = s->n, m = s->pre.rows.m;
   memset(s->point.y, 0, m * sizeof *s->point.y);
   memset(s->point.active, QP_FREE, m);
@@ -193,7 +193,7 @@ static batten_status try_unbounded(solver *s) {
 }
 
 /* One run of an engine, and what becomes of its word. Fails only where going on makes no sense. */
-static batten_status run(solver *s, batten_qp_engine engine, start from) {
+static batten_status run(solver *s, batten_qp_engine engine, beginning from) {
   batten_status st = BATTEN_OK;
   set_start(s, from);
   if (s->n > 0)
@@ -270,7 +270,7 @@ static batten_status polish(solver *s, bool *refused) {
 /* A dense engine that gets stuck, or claims what it cannot prove, is tried again with more curvature; the interior
  * point's working set, where it is not yet right, goes on in the dual engine if the caller lets engines help each
  * other. */
-static batten_status attempt(solver *s, batten_qp_engine engine, start from) {
+static batten_status attempt(solver *s, batten_qp_engine engine, beginning from) {
   bool refused;
   batten_status st = run(s, engine, from);
   if (st >= 0) st = polish(s, &refused);
