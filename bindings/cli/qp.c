@@ -20,6 +20,7 @@ enum {
   OPT_ENGINE,
   OPT_TOLERANCE,
   OPT_EXACT,
+  OPT_START,
   OPT_TIME_LIMIT,
   OPT_ITERATIONS,
   OPT_MEMORY,
@@ -37,6 +38,8 @@ static const cli_option table[] = {
     {"tolerance", OPT_TOLERANCE, "T",
      "residuals and gap within T + T times their scale count as solved; default\n1e-9"},
     {"exact", OPT_EXACT, NULL, "move x until every inequality holds exactly in floating point"},
+    {"start", OPT_START, "FILE",
+     "start from x and active set of an earlier solution (.json of -o), also of a\nslightly other problem of the same size"},
     {"time-limit", OPT_TIME_LIMIT, "S", "stop after so many seconds, with the best feasible point; default none"},
     {"iterations", OPT_ITERATIONS, "N", "stop after so many pivots or interior steps; default by size, generous"},
     {"memory", OPT_MEMORY, "SIZE", "use at most so much, for instance 2G; default 90 % of what the machine has"},
@@ -82,6 +85,9 @@ static bool take_option(qp_request *q, int key, const char *v) {
       break;
     case OPT_EXACT:
       o->exact = 1;
+      break;
+    case OPT_START:
+      q->start = v;
       break;
     case OPT_TIME_LIMIT:
       ok = cli_parse_number("--time-limit", v, 1e-9, INFINITY, &o->time_limit_s);
@@ -144,6 +150,17 @@ static int parse(int argc, char **argv, qp_request *q) {
 
 /* ---- phases -------------------------------------------------------------------------------------- */
 
+/* Where --start is given, it takes the place of the file's x0. */
+static batten_status read_start(qp_work *w) {
+  batten_context *ctx = w->run.ctx;
+  size_t n = w->counts.unknowns, all = n + w->counts.rows;
+  if (!w->request->start) return BATTEN_OK;
+  w->start.x = batten_alloc_array(ctx, n, sizeof *w->start.x);
+  w->start.active = batten_alloc_array(ctx, all, sizeof *w->start.active);
+  if (!w->start.x || !w->start.active) return BATTEN_E_NOMEM;
+  return batten_read_qp_solution(ctx, &w->file, w->request->start, &w->start);
+}
+
 static batten_status solve(qp_work *w) {
   batten_context *ctx = w->run.ctx;
   batten_qp_options o = w->request->options;
@@ -155,7 +172,8 @@ static batten_status solve(qp_work *w) {
   s->certificate = batten_alloc_array(ctx, all, sizeof *s->certificate);
   s->active = batten_alloc_array(ctx, all, sizeof *s->active);
   if (!s->x || !s->ray || !s->multipliers || !s->certificate || !s->active) return BATTEN_E_NOMEM;
-  o.x0 = w->file.x0;
+  o.x0 = w->start.x ? w->start.x : w->file.x0;
+  o.active = w->start.active;
   return batten_qp_solve(ctx, &w->file.problem, &o, NULL, s, &w->info);
 }
 
@@ -203,6 +221,8 @@ static int write_outputs(qp_work *w) {
 static void work_free(qp_work *w) {
   batten_context *ctx = w->run.ctx;
   if (!ctx) return;
+  batten_free(ctx, w->start.x);
+  batten_free(ctx, w->start.active);
   batten_free(ctx, w->solution.x);
   batten_free(ctx, w->solution.ray);
   batten_free(ctx, w->solution.multipliers);
@@ -220,11 +240,12 @@ static int work(qp_request *q) {
   w.run.outputs = &q->outputs;
   double start = batten_now();
   batten_status st = batten_read_qp(w.run.ctx, q->input, &w.file);
-  w.time_read_s = batten_now() - start;
   if (st >= 0) {
     qp_count(&w.file.problem, &w.counts);
-    w.status = st = solve(&w);
+    st = read_start(&w);
   }
+  w.time_read_s = batten_now() - start;
+  if (st >= 0) w.status = st = solve(&w);
   if (st < 0 && qp_has_figures(st)) qp_explain(&w, text, sizeof text);
   int status = !qp_has_figures(st) || cli_interrupted() ? cli_run_failed(&w.run, st) : CLI_DONE;
   if (status == CLI_DONE && st > 0) cli_run_warn(&w.run, st);

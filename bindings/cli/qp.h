@@ -18,6 +18,7 @@ typedef struct qp_counts {
 
 typedef struct qp_request {
   const char *input;
+  const char *start; /* file of an earlier solution, or NULL */
   cli_outputs outputs;
   batten_qp_options options;
   bool quiet, help;
@@ -30,7 +31,7 @@ typedef struct qp_work {
   cli_run run;
   batten_qp_file file;
   qp_counts counts;
-  batten_qp_solution solution;
+  batten_qp_solution start, solution; /* start: of --start, else without arrays */
   batten_qp_info info;
   batten_status status; /* of solving */
   double time_read_s, time_write_s;

@@ -237,3 +237,66 @@ batten_status bx_load_qp(bx_reader *r, batten_qp_file *out) {
   json_decref(root);
   return st;
 }
+
+/* ---- solutions ------------------------------------------------------------------------------------- */
+
+/* A solution belongs to one problem; of another one its sizes mostly differ. */
+static batten_status check_sizes(bx_json *j, const json_t *root, const char *key, size_t count, const char *of) {
+  json_t *value;
+  batten_status st = bx_get(j, root, key, &value);
+  if (st != BATTEN_OK || !json_is_array(value) || json_array_size(value) == count) return st;
+  return bx_json_fail(j, "%zu numbers in '%s', but the problem has %zu %s; is it the solution of another one?",
+                      json_array_size(value), key, count, of);
+}
+
+/* No x: the status, if there is one, says why. */
+static batten_status check_solved(bx_json *j, const json_t *root) {
+  const char *word = json_string_value(json_object_get(root, "status"));
+  char quote[BX_QUOTE_SIZE];
+  if (json_object_get(root, "x") || !word) return BATTEN_OK;
+  return bx_json_fail(j, "'x' is missing, as the status is '%s'; only what has an x can be taken from here",
+                      bx_quote(word, strlen(word), quote));
+}
+
+typedef struct qp_arrays {
+  double *x, *multipliers, *active;
+} qp_arrays;
+
+static batten_status get_solution(bx_json *j, const json_t *root, size_t n, size_t all, const batten_qp_solution *to,
+                                  qp_arrays *got) {
+  const char *both = "rows and unknowns";
+  batten_status st = check_solved(j, root);
+  if (st == BATTEN_OK && to->x) st = check_sizes(j, root, "x", n, "unknowns");
+  if (st == BATTEN_OK && to->multipliers) st = check_sizes(j, root, "multipliers", all, both);
+  if (st == BATTEN_OK && to->active) st = check_sizes(j, root, "active", all, both);
+  if (st == BATTEN_OK && to->x) st = bx_get_numbers(j, root, "x", n, got->x);
+  if (st == BATTEN_OK && to->multipliers) st = bx_get_numbers(j, root, "multipliers", all, got->multipliers);
+  if (st == BATTEN_OK && to->active) st = bx_get_numbers(j, root, "active", all, got->active);
+  for (size_t i = 0; st == BATTEN_OK && to->active && i < all; i++) {
+    double a = got->active[i];
+    if (a >= -1 && a <= 2 && !(a > floor(a))) continue;
+    bx_enter(j, "active");
+    bx_enter_item(j, i);
+    st = bx_json_fail(j, "%g, where -1 (lower side), 1 (upper), 2 (equality) or 0 is expected", a);
+  }
+  return st;
+}
+
+batten_status bx_load_qp_solution(bx_reader *r, size_t n, size_t m, const batten_qp_solution *out) {
+  json_t *root = NULL;
+  bx_json j = {.ctx = r->ctx, .path = r->path};
+  qp_arrays got = {bx_qp_fill(r->ctx, n, 0), bx_qp_fill(r->ctx, m + n, 0), bx_qp_fill(r->ctx, m + n, 0)};
+  batten_status st = got.x && got.multipliers && got.active ? BATTEN_OK : BATTEN_E_NOMEM;
+  if (st == BATTEN_OK) st = bx_json_parse(r, &root);
+  if (st == BATTEN_OK) st = bx_check_head(&j, root, "qp_solution");
+  snprintf(j.place, sizeof j.place, "qp_solution");
+  if (st == BATTEN_OK) st = get_solution(&j, root, n, m + n, out, &got);
+  for (size_t i = 0; st == BATTEN_OK && out->x && i < n; i++) out->x[i] = got.x[i];
+  for (size_t i = 0; st == BATTEN_OK && out->multipliers && i < m + n; i++) out->multipliers[i] = got.multipliers[i];
+  for (size_t i = 0; st == BATTEN_OK && out->active && i < m + n; i++) out->active[i] = (signed char)got.active[i];
+  json_decref(root);
+  batten_free(r->ctx, got.x);
+  batten_free(r->ctx, got.multipliers);
+  batten_free(r->ctx, got.active);
+  return st;
+}

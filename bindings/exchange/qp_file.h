@@ -79,4 +79,7 @@ batten_status bx_read_qps(bx_reader *r, batten_qp_file *out);
 batten_status bx_read_mat(bx_reader *r, batten_qp_file *out);
 batten_status bx_load_qp(bx_reader *r, batten_qp_file *out);
 
+/* x, multipliers and active into those arrays of out that are there; n unknowns, m rows. */
+batten_status bx_load_qp_solution(bx_reader *r, size_t n, size_t m, const batten_qp_solution *out);
+
 #endif

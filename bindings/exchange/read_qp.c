@@ -1,4 +1,4 @@
-/* Quadratic programs from files: the reader of the format. */
+/* Quadratic programs and their solutions from files: the reader of the format. */
 #include "qp_file.h"
 
 batten_status bx_read_qp_from(bx_reader *r, bx_format format, batten_qp_file *out) {
@@ -26,6 +26,23 @@ batten_status batten_read_qp(batten_context *ctx, const char *path, batten_qp_fi
   st = bx_open(&r, ctx, path);
   if (st != BATTEN_OK) return st;
   st = bx_read_qp_from(&r, format, out);
+  bx_close(&r);
+  return st;
+}
+
+batten_status batten_read_qp_solution(batten_context *ctx, const batten_qp_file *file, const char *path,
+                                      batten_qp_solution *solution) {
+  batten_status st = bx_check_pointers(ctx, path, file, "file");
+  if (st == BATTEN_OK) st = bx_check_pointers(ctx, path, solution, "solution");
+  if (st != BATTEN_OK) return st;
+  bool gz;
+  if (bx_format_of(path, &gz) != BX_JSON)
+    return batten_fail(ctx, BATTEN_E_INVALID, "%s: solutions are read from .json, also with .gz; rename the file",
+                       bx_short_path(path));
+  bx_reader r;
+  st = bx_open(&r, ctx, path);
+  if (st != BATTEN_OK) return st;
+  st = bx_load_qp_solution(&r, file->problem.n, file->problem.c ? file->problem.c->rows : 0, solution);
   bx_close(&r);
   return st;
 }

@@ -9,7 +9,7 @@ set -u
 run 0 "" qp --help
 cp out help
 check "no line of the help is longer than 118" awk 'length > 118 { exit 1 }' help
-for option in output report write engine tolerance exact time-limit iterations memory threads quiet; do
+for option in output report write engine tolerance exact start time-limit iterations memory threads quiet; do
   check "the help tells --$option" grep -q -- " --$option" help
 done
 sed -n '/^example/,/^exit status/p' help | grep '^  ' >example.sh
@@ -122,6 +122,38 @@ check "inspect tells sizes" grep -Eq '^problem +HS21 AND MORE: 3 unknowns, 3 row
 check "inspect tells the engine" grep -Eq '^engine +(primal|dual|interior) would be taken' out
 holds i.json bytes_predicted 'x > 100'
 holds i.json hessian_max 'x == 2'
+
+# ---- starting from an earlier solution ----------------------------------------------------------
+
+python3 - <<'PY'
+import json, random
+n, m = 20, 400
+rows = random.Random(1)
+rows = [[rows.gauss(0, 1) for j in range(n)] for i in range(m)]
+for name, change in (("first", 0), ("second", 1e-3)):
+    g = random.Random(2)
+    g = [30 * g.gauss(0, 1) * (1 + change * g.random()) for j in range(n)]
+    json.dump({"batten": "qp", "version": 1, "H": [[float(i == j) for j in range(n)] for i in range(n)], "g": g,
+               "C": rows, "lower": [-1] * m, "x_upper": [0.9] * n}, open(name + ".json", "w"))
+PY
+for engine in primal dual; do
+  run 0 "" qp first.json --engine $engine -o s.json --quiet
+  run 0 "" qp second.json --engine $engine -o cold.json --report cold-r.json --quiet
+  run 0 "" qp second.json --engine $engine --start s.json -o s.json --report warm-r.json --quiet
+  is warm-r.json status optimal
+  holds cold-r.json iterations 'x >= 10'
+  holds warm-r.json iterations "x <= 0.2 * $(figure cold-r.json iterations)"
+  python3 - <<'PY'
+import json, sys
+a, b = (json.load(open(f))["x"] for f in ("cold.json", "s.json"))
+sys.exit(max(abs(p - q) for p, q in zip(a, b)) > 1e-7)
+PY
+  ok $? "$engine: warm and cold find the same point, the file that was started from is replaced"
+done
+run 1 "s.json: qp_solution: 20 numbers in 'x', but the problem has 3 unknowns" qp p.qps --start s.json
+run 1 "q.json: document: it holds a batten 'qp', not a qp_solution" qp p.qps --start q.json
+run 1 "none.json: cannot open" qp p.qps --start none.json
+run 1 "x.csv: solutions are read from .json" qp p.qps --start x.csv
 
 run 1 "p.qps: --time-limit: time is up" qp p.qps --time-limit 1e-9 --engine dual --report l.json
 is l.json status limit

@@ -342,6 +342,57 @@ static void test_solutions(batten_context *ctx, scratch *folder) {
   T_STATUS(batten_write_qp_solution(ctx, &f, BATTEN_OK, NULL, "s.csv"), BATTEN_E_INVALID, ctx, "solution: NULL");
 }
 
+/* Solutions back from files, for a problem of 2 unknowns and 1 row. */
+static void test_solutions_read(batten_context *ctx, scratch *folder) {
+#define SOLUTION(members) "{\"batten\": \"qp_solution\", \"version\": 1" members "}"
+#define ACTIVE ", \"x\": [1, 2], \"multipliers\": [0, 0, 0], \"active\": "
+  static const struct {
+    const char *text, *part;
+  } cases[] = {
+      {"{\"batten\": \"qp\", \"version\": 1}", "document: it holds a batten 'qp', not a qp_solution"},
+      {SOLUTION(", \"status\": \"infeasible\", \"certificate\": [1, 1]"),
+       "qp_solution: 'x' is missing, as the status is 'infeasible'"},
+      {SOLUTION(""), "qp_solution: 'x' is missing"},
+      {SOLUTION(", \"x\": [1, 2]"), "qp_solution: 'multipliers' is missing"},
+      {SOLUTION(", \"x\": [1, 2, 3]"),
+       "qp_solution: 3 numbers in 'x', but the problem has 2 unknowns; is it the solution of another one?"},
+      {SOLUTION(ACTIVE "[0, 0]"), "qp_solution: 2 numbers in 'active', but the problem has 3 rows and unknowns"},
+      {SOLUTION(ACTIVE "1"), "qp_solution.active: a number, where an array is expected"},
+      {SOLUTION(ACTIVE "[0, 0, -2]"), "qp_solution.active[2]: -2, where -1 (lower side), 1 (upper), 2 (equality) or 0"},
+      {SOLUTION(ACTIVE "[0, 0.5, 0]"), "qp_solution.active[1]: 0.5, where"},
+      {SOLUTION(ACTIVE "[0, null, 0]"), "qp_solution.active[1]: null, where a number is expected"},
+  };
+  static const double none[] = {0, 0};
+  batten_matrix c = batten_matrix_dense(1, 2, none);
+  batten_qp_file f = {.problem = {.struct_size = sizeof f.problem, .n = 2, .c = &c}};
+  double x[] = {7, 7}, y[] = {7, 7, 7};
+  signed char active[] = {7, 7, 7};
+  batten_qp_solution s = {.x = x, .multipliers = y, .active = active};
+  const char *path = scratch_file(folder, "start.json");
+  for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+    file_write(path, cases[i].text, strlen(cases[i].text));
+    T_STATUS(batten_read_qp_solution(ctx, &f, path, &s), BATTEN_E_FORMAT, ctx, cases[i].part);
+    if (x[0] < 7 || y[0] < 7 || active[0] != 7) T_CHECK(false, "the arrays are as they were");
+  }
+  T_STATUS(batten_read_qp_solution(ctx, &f, "s.csv", &s), BATTEN_E_INVALID, ctx, "solutions are read from .json");
+  T_STATUS(batten_read_qp_solution(ctx, &f, "none.json", &s), BATTEN_E_IO, ctx, "none.json: cannot open");
+  T_STATUS(batten_read_qp_solution(ctx, &f, path, NULL), BATTEN_E_INVALID, ctx, "solution: NULL");
+  T_STATUS(batten_read_qp_solution(ctx, NULL, path, &s), BATTEN_E_INVALID, ctx, "file: NULL");
+
+  double u[] = {0.1, -1e300}, v[] = {1. / 3, 0, -5e-324};
+  signed char w[] = {-1, 1, 2};
+  T_OK(batten_write_qp_solution(ctx, &f, BATTEN_W_STOPPED,
+                                &(batten_qp_solution){.x = u, .multipliers = v, .active = w}, path),
+       ctx);
+  T_OK(batten_read_qp_solution(ctx, &f, path, &s), ctx);
+  T_CHECK(!memcmp(x, u, sizeof u) && !memcmp(y, v, sizeof v) && !memcmp(active, w, sizeof w),
+          "what was written comes back to the same bits");
+  T_OK(batten_write_qp_solution(ctx, &f, BATTEN_OK, &(batten_qp_solution){.x = u}, path), ctx);
+  T_OK(batten_read_qp_solution(ctx, &f, path, &(batten_qp_solution){.x = x}), ctx);
+#undef SOLUTION
+#undef ACTIVE
+}
+
 /* ---- what is refused --------------------------------------------------------------------------------- */
 
 #define HEAD "NAME\nROWS\n N o\n L r\n G s\nCOLUMNS\n x o 1 r 1\n y r 2\n"
@@ -484,6 +535,13 @@ static batten_status write_again(batten_context *ctx, void *arg) {
   return st;
 }
 
+static batten_status read_solution_again(batten_context *ctx, void *arg) {
+  double x[2], y[2];
+  signed char active[2];
+  batten_qp_file f = {.problem = {.struct_size = sizeof f.problem, .n = 2}};
+  return batten_read_qp_solution(ctx, &f, arg, &(batten_qp_solution){.x = x, .multipliers = y, .active = active});
+}
+
 static void test_failures(scratch *folder) {
   char from[400], qps[400], json[400];
   snprintf(from, sizeof from, "%s", scratch_file(folder, "fail.qps"));
@@ -498,6 +556,10 @@ static void test_failures(scratch *folder) {
   t_fail_every_allocation("reading JSON", read_again, json);
   t_cancel_every_progress("reading QPS", read_again, from);
   t_cancel_every_progress("reading JSON", read_again, json);
+  static const char solution[] =
+      "{\"batten\": \"qp_solution\", \"version\": 1, \"x\": [1, 2], \"multipliers\": [0, 0], \"active\": [0, 0]}";
+  file_write(json, solution, strlen(solution));
+  t_fail_every_allocation("reading a solution", read_solution_again, json);
 }
 
 static void test_speed(batten_context *ctx, scratch *folder) {
@@ -542,6 +604,7 @@ int main(void) {
   test_round_trips(ctx, &folder);
   test_defaults(ctx, &folder);
   test_solutions(ctx, &folder);
+  test_solutions_read(ctx, &folder);
   test_bad(ctx, &folder);
   test_failures(&folder);
   test_speed(ctx, &folder);

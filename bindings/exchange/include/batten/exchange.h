@@ -109,6 +109,13 @@ BATTEN_API batten_status batten_write_qp(batten_context *ctx, const batten_qp_fi
 BATTEN_API batten_status batten_write_qp_solution(batten_context *ctx, const batten_qp_file *file, batten_status status,
                                                   const batten_qp_solution *solution, const char *path);
 
+/* x, multipliers and active of a .json that batten_write_qp_solution wrote (also .gz), to start from (opt.x0, opt.active)
+ * or to look at: each into the caller's array, [n] and [m + n] of file->problem, where solution has one; the file must
+ * have that member then. certificate and ray are not looked at.
+ * Fails: IO, FORMAT (other sizes; no x, as there was no solution), INVALID, NOMEM; the arrays are as they were then. */
+BATTEN_API batten_status batten_read_qp_solution(batten_context *ctx, const batten_qp_file *file, const char *path,
+                                                 batten_qp_solution *solution);
+
 /* What a file holds, by extension and content; only as much is read as that takes. Fails: IO, FORMAT. */
 typedef enum batten_file_kind {
   BATTEN_FILE_UNKNOWN = 0,
