@@ -1,9 +1,9 @@
 /* What the parts of solvers/qp say to each other. Data flow one way (public types in <batten/qp.h>):
  *
- *   qp.c         check the caller's problem, then
+ *   qp.c         the driver (driver.h): check.c the caller's problem, choose.c engines, judge, try the next, then
  *   presolve.c     caller's rows and bounds -> qp_rows: unit length, merged, redundant ones left out; and back again
  *   objective.c    caller's A, b, w, H, g   -> qp_objective: gradients, triangular factor, sparse Hessian
- *   proximal.c     the engines on a strictly convex problem, or a sequence of such
+ *   proximal.c     the engines on a strictly convex problem, or a sequence of such; refine.c the last digits
  *     dual.c primal.c (on active.c, phase1.c)   dense engines: 1/2 |R x - c|^2
  *     interior.c (on ordering.c, band.c)        sparse engine: 1/2 x'Hx + g'x
  *   certify.c    residuals, certificates, rays from the caller's data alone

@@ -57,8 +57,9 @@ typedef struct batten_qp_options {
   const double *x0;          /* [n] start; the primal engine goes on from it when it is feasible. NULL = none */
   const signed char *active; /* [m + n] working set to start from, as batten_qp_solution.active; NULL = none */
 
-  int hand_over; /* 1: the interior point's active set is given to a dense engine for the last digits where n allows it;
-                    0: never. Default 1 */
+  int hand_over; /* 1: engines help each other: the interior point's active set is given to a dense engine for the last
+                    digits where n allows it, and where an engine gets stuck, also one that was asked for, others are
+                    tried. 0: one engine alone. Default 1 */
 
   /* 1: the result satisfies every inequality and bound exactly: in exact arithmetic, and in floating point however the
    * products of a row are added up. x is moved towards a strictly feasible point by the fraction that is
