@@ -47,9 +47,9 @@ ip_figures ip_judge(const qp_scaled *s, const double *x, const double *y, double
   double scale_primal = 0, scale_dual = 0, quadratic = 0, linear = 0, dual_value = 0;
   qp_scaled_rows(s, x, scratch_m);
   for (size_t k = 0; k < s->m; k++) {
-    double ax = scratch_m[k], miss = fmax(s->lower[k] - ax, ax - s->upper[k]);
+    double ax = scratch_m[k], miss = qp_larger(s->lower[k] - ax, ax - s->upper[k]);
     if (!(miss <= 0)) f.primal = larger(f.primal, miss / s->f[k]);
-    scale_primal = fmax(scale_primal, fabs(ax) / s->f[k]);
+    scale_primal = qp_larger(scale_primal, fabs(ax) / s->f[k]);
     double side = y[k] > 0 ? s->lower[k] : s->upper[k];
     if (y[k] != 0 && isfinite(side)) dual_value += y[k] * side;
     if (y[k] != 0 && !isfinite(side)) f.dual = larger(f.dual, fabs(y[k]) * s->f[k] / s->cost);
@@ -58,7 +58,7 @@ ip_figures ip_judge(const qp_scaled *s, const double *x, const double *y, double
   for (size_t j = 0; j < s->n; j++) {
     quadratic += x[j] * scratch_n[j];
     linear += s->g[j] * x[j];
-    scale_dual = fmax(scale_dual, fmax(fabs(scratch_n[j]), fabs(s->g[j])) / (s->e[j] * s->cost));
+    scale_dual = qp_larger(scale_dual, qp_larger(fabs(scratch_n[j]), fabs(s->g[j])) / (s->e[j] * s->cost));
     scratch_n[j] += s->g[j];
   }
   qp_scaled_add(s, -1, y, scratch_n);
@@ -155,7 +155,8 @@ static void step(ip *p, double enough) {
   }
 }
 
-static double room(double alpha, double v, double dv) { return dv < 0 && -v / dv < alpha ? -v / dv : alpha; }
+/* The part of alpha that keeps v + alpha dv >= 0; divides only where it must. */
+static double room(double alpha, double v, double dv) { return v + alpha * dv < 0 ? -v / dv : alpha; }
 
 /* Largest steps in [0, 1] that keep slacks and multipliers >= 0. */
 static void longest(const ip *p, double *primal, double *dual) {
@@ -195,7 +196,7 @@ static double bring_back(double product, double target) {
   const double BETA = 0.1;
   double low = BETA * target, high = target / BETA;
   if (product < low) return low - product;
-  if (product > high) return fmax(high - product, -high);
+  if (product > high) return qp_larger(high - product, -high);
   return 0;
 }
 
@@ -225,7 +226,7 @@ static void start(ip *p) {
   for (size_t k = 0; k < s->m; k++) {
     p->newton.w[k] = p->kind[k] == IP_EQUAL ? p->delta : 1;
     double lo = s->lower[k], hi = s->upper[k];
-    p->r2[k] = p->kind[k] == IP_BOTH ? fmin(fmax(0, lo), hi) : p->kind[k] == IP_UPPER ? hi : lo;
+    p->r2[k] = p->kind[k] == IP_BOTH ? fmin(qp_larger(0, lo), hi) : p->kind[k] == IP_UPPER ? hi : lo;
   }
   for (size_t j = 0; j < s->n; j++) p->r1[j] = -s->g[j];
   ip_newton_factor(&p->newton, 0, 0);
@@ -234,19 +235,20 @@ static void start(ip *p) {
   for (size_t k = 0; k < s->m; k++) {
     double y = p->y[k];
     p->tl[k] = p->ax[k] - s->lower[k], p->tu[k] = s->upper[k] - p->ax[k];
-    p->vl[k] = p->kind[k] == IP_BOTH ? fmax(y, 0) : y, p->vu[k] = p->kind[k] == IP_BOTH ? fmax(-y, 0) : -y;
+    p->vl[k] = p->kind[k] == IP_BOTH ? qp_larger(y, 0) : y, p->vu[k] = p->kind[k] == IP_BOTH ? qp_larger(-y, 0) : -y;
     if (p->kind[k] & IP_LOWER) low_t = fmin(low_t, p->tl[k]), low_v = fmin(low_v, p->vl[k]);
     if (p->kind[k] & IP_UPPER) low_t = fmin(low_t, p->tu[k]), low_v = fmin(low_v, p->vu[k]);
   }
-  double shift_t = fmax(-1.5 * low_t, 0), shift_v = fmax(-1.5 * low_v, 0), product = 0, sum_t = 0, sum_v = 0;
+  double shift_t = qp_larger(-1.5 * low_t, 0), shift_v = qp_larger(-1.5 * low_v, 0), product = 0, sum_t = 0,
+         sum_v = 0;
   for (size_t k = 0; k < s->m; k++) {
     p->tl[k] += shift_t, p->tu[k] += shift_t, p->vl[k] += shift_v, p->vu[k] += shift_v;
     if (p->kind[k] & IP_LOWER) product += p->tl[k] * p->vl[k], sum_t += p->tl[k], sum_v += p->vl[k];
     if (p->kind[k] & IP_UPPER) product += p->tu[k] * p->vu[k], sum_t += p->tu[k], sum_v += p->vu[k];
   }
   double more_t = sum_v > 0 ? product / sum_v / 2 : 0, more_v = sum_t > 0 ? product / sum_t / 2 : 0;
-  more_t = fmax(more_t, shift_t + low_t < 1e-3 ? 1 : 0);
-  more_v = fmax(more_v, shift_v + low_v < 1e-3 ? 1 : 0);
+  more_t = qp_larger(more_t, shift_t + low_t < 1e-3 ? 1 : 0);
+  more_v = qp_larger(more_v, shift_v + low_v < 1e-3 ? 1 : 0);
   for (size_t k = 0; k < s->m; k++) {
     p->tl[k] += more_t, p->tu[k] += more_t, p->vl[k] += more_v, p->vu[k] += more_v;
     if (!(p->kind[k] & IP_LOWER)) p->tl[k] = p->vl[k] = 0;
@@ -313,13 +315,13 @@ static void keep_best(ip *p) {
 static void regularize(ip *p, size_t count, double a, double b) {
   const double START = 1e-6, LEAST = 1e-14, LAG = 0.1, WRONG = 1e-2;
   double primal = 0, dual = 0;
-  for (size_t k = 0; k < p->s->m; k++) primal = fmax(primal, fmax(fabs(p->rl[k]), fabs(p->ru[k])));
-  for (size_t j = 0; j < p->s->n; j++) dual = fmax(dual, fabs(p->rd[j]));
+  for (size_t k = 0; k < p->s->m; k++) primal = qp_larger(primal, qp_larger(fabs(p->rl[k]), fabs(p->ru[k])));
+  for (size_t j = 0; j < p->s->n; j++) dual = qp_larger(dual, fabs(p->rd[j]));
   if (count == 0)
     p->newton.rho = p->delta = START;
   else {
-    if (primal > (1 - a + LAG) * p->lag_primal) p->delta = fmax(p->delta / 10, LEAST);
-    if (dual > (1 - b + LAG) * p->lag_dual) p->newton.rho = fmax(p->newton.rho / 10, LEAST);
+    if (primal > (1 - a + LAG) * p->lag_primal) p->delta = qp_larger(p->delta / 10, LEAST);
+    if (dual > (1 - b + LAG) * p->lag_dual) p->newton.rho = qp_larger(p->newton.rho / 10, LEAST);
     if (p->error > WRONG) {
       p->delta = fmin(100 * p->delta, START);
       p->newton.rho = fmin(100 * p->newton.rho, START);
@@ -370,10 +372,10 @@ static void direction(ip *p, double *a, double *b) {
     return;
   }
   double both = fmin(*a, *b), ratio = mu_after(p, both, both) / p->mu;
-  double sigma = fmin(1, fmax(1e-8, ratio * ratio * ratio));
+  double sigma = fmin(1, qp_larger(1e-8, ratio * ratio * ratio));
   /* Below what the gap asks for, products only lose digits while residuals are still on their way. */
   double least = 1e-4 * p->limits->tolerance * p->value_scale / (double)p->sides;
-  double target = fmax(sigma * p->mu, least);
+  double target = qp_larger(sigma * p->mu, least);
   aim_centre(p, target);
   step(p, FINE);
   longest(p, a, b);
@@ -381,6 +383,7 @@ static void direction(ip *p, double *a, double *b) {
 }
 
 static batten_status iterate(batten_context *ctx, ip *p, size_t *count) {
+  const double NEARLY = 1e-8; /* residuals that no problem without solution reaches */
   const size_t PATIENCE = 30; /* steps without a better point or smaller mu */
   size_t idle = 0;
   double mark = INFINITY, least_mu = INFINITY; /* of the last progress worth the name */
@@ -398,11 +401,13 @@ static batten_status iterate(batten_context *ctx, ip *p, size_t *count) {
     if (idle > PATIENCE || !isfinite(p->figures.merit)) return BATTEN_W_ACCURACY;
     batten_status st = qp_limits_check(ctx, p->limits, *count, 1 - 1 / (1 + 0.1 * (double)*count));
     if (st < 0) return st;
-    if (ip_prove_infeasible(&p->newton, &p->work, p->y, p->work.y)) return BATTEN_E_INFEASIBLE;
-    if (ip_prove_unbounded(&p->newton, &p->work, p->x, p->work.x)) return BATTEN_E_UNBOUNDED;
+    if (p->figures.primal > NEARLY && ip_prove_infeasible(&p->newton, &p->work, p->y, p->work.y))
+      return BATTEN_E_INFEASIBLE;
+    if (p->figures.dual > NEARLY && ip_prove_unbounded(&p->newton, &p->work, p->x, p->work.x))
+      return BATTEN_E_UNBOUNDED;
     regularize(p, *count, a, b);
     direction(p, &a, &b);
-    double inward = fmax(0.99, 1 - p->mu);
+    double inward = qp_larger(0.99, 1 - p->mu);
     a = a < 1 ? a * inward : 1, b = b < 1 ? b * inward : 1;
     advance(p, a, b);
   }

@@ -32,12 +32,12 @@ void ip_newton_free(batten_context *ctx, ip_newton *k) {
 void ip_newton_factor(ip_newton *k, double rho_least, double w_least) {
   const qp_scaled *s = k->s;
   const double CONDENSED = 1e-12; /* 1/w beyond this leaves too little of H in what is condensed */
-  double rho = fmax(k->rho, rho_least);
-  if (k->kkt.bordered) w_least = fmax(w_least, CONDENSED);
+  double rho = qp_larger(k->rho, rho_least);
+  if (k->kkt.bordered) w_least = qp_larger(w_least, CONDENSED);
   for (size_t j = 0; j < s->n; j++) k->d[j] = rho;
-  for (size_t i = 0; i < s->general; i++) k->factored_w[i] = fmax(k->w[i], w_least);
-  for (size_t i = s->general; i < s->m; i++) k->d[s->column[i - s->general]] += 1 / fmax(k->w[i], w_least);
-  for (size_t i = s->general; i < s->m; i++) k->factored_w[i] = fmax(k->w[i], w_least);
+  for (size_t i = 0; i < s->general; i++) k->factored_w[i] = qp_larger(k->w[i], w_least);
+  for (size_t i = s->general; i < s->m; i++) k->d[s->column[i - s->general]] += 1 / qp_larger(k->w[i], w_least);
+  for (size_t i = s->general; i < s->m; i++) k->factored_w[i] = qp_larger(k->w[i], w_least);
   qp_kkt_factor(&k->kkt, k->d, k->factored_w);
   k->factorizations++;
 }
@@ -52,9 +52,9 @@ static double residual(ip_newton *k, const double *r1, const double *r2, const d
   qp_scaled_rows(s, dx, k->q2);
   for (size_t i = 0; i < s->m; i++) {
     k->q2[i] = (r2 ? r2[i] : 0) - k->q2[i] - k->w[i] * dy[i];
-    size = fmax(size, fabs(k->q2[i]) / fmax(1, k->w[i]));
+    size = qp_larger(size, fabs(k->q2[i]) / qp_larger(1, k->w[i]));
   }
-  for (size_t j = 0; j < s->n; j++) size = fmax(size, fabs(k->q1[j]));
+  for (size_t j = 0; j < s->n; j++) size = qp_larger(size, fabs(k->q1[j]));
   return size;
 }
 
@@ -64,11 +64,11 @@ static double start_residual(ip_newton *k, const double *r1, const double *r2) {
   double size = 0;
   for (size_t j = 0; j < s->n; j++) {
     k->q1[j] = r1[j];
-    size = fmax(size, fabs(r1[j]));
+    size = qp_larger(size, fabs(r1[j]));
   }
   for (size_t i = 0; i < s->m; i++) {
     k->q2[i] = r2[i];
-    size = fmax(size, fabs(r2[i]) / fmax(1, k->w[i]));
+    size = qp_larger(size, fabs(r2[i]) / qp_larger(1, k->w[i]));
   }
   return size;
 }
@@ -85,7 +85,7 @@ static void correct(ip_newton *k, double *dx, double *dy) {
 }
 
 /* Weight of a row in inner products, as in residual(). */
-static double weight(const ip_newton *k, size_t i) { return 1 / fmax(1, k->w[i]); }
+static double weight(const ip_newton *k, size_t i) { return 1 / qp_larger(1, k->w[i]); }
 
 static double product(const ip_newton *k, const double *a, const double *b) {
   size_t n = k->s->n, m = k->s->m;
@@ -157,7 +157,7 @@ static double krylov(ip_newton *k, const double *r1, const double *r2, double *d
 
 double ip_newton_solve(ip_newton *k, double enough, const double *r1, const double *r2, double *dx, double *dy) {
   const int ROUNDS = 8, CYCLES = 2;
-  const double TOO_LARGE = fmax(1e-9, enough);
+  const double TOO_LARGE = qp_larger(1e-9, enough);
   const qp_scaled *s = k->s;
   size_t bytes_n = s->n * sizeof *dx, bytes_m = s->m * sizeof *dy;
   memset(dx, 0, bytes_n);

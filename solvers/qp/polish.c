@@ -30,11 +30,11 @@ static double residuals(const qp_scaled *s, const ip_polish_work *p) {
       qp_twice_add(&p->sum[s->column[k - s->general]], p->y[k]);
     }
     p->r2[k] = qp_twice_value(left);
-    size = fmax(size, fabs(p->r2[k]));
+    size = qp_larger(size, fabs(p->r2[k]));
   }
   for (size_t j = 0; j < s->n; j++) {
     p->r1[j] = qp_twice_value(p->sum[j]);
-    size = fmax(size, fabs(p->r1[j]));
+    size = qp_larger(size, fabs(p->r1[j]));
   }
   return size;
 }

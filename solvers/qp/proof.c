@@ -11,7 +11,7 @@ static const double PROVEN = 1e-12; /* relative: rounding, with the caller's sca
 
 static double largest(size_t count, const double *v) {
   double top = 0;
-  for (size_t i = 0; i < count; i++) top = fmax(top, fabs(v[i]));
+  for (size_t i = 0; i < count; i++) top = qp_larger(top, fabs(v[i]));
   return top;
 }
 
@@ -73,8 +73,8 @@ bool ip_prove_infeasible(ip_newton *k, ip_polish_work *work, const double *y, do
 static double outside(const qp_scaled *s, const double *ax, const double *hd) {
   double worst = largest(s->n, hd);
   for (size_t k = 0; k < s->m; k++) {
-    if (isfinite(s->lower[k])) worst = fmax(worst, -ax[k]);
-    if (isfinite(s->upper[k])) worst = fmax(worst, ax[k]);
+    if (isfinite(s->lower[k])) worst = qp_larger(worst, -ax[k]);
+    if (isfinite(s->upper[k])) worst = qp_larger(worst, ax[k]);
   }
   return worst;
 }

@@ -47,13 +47,13 @@ static void largest(const qp_scaled *s, double *of_unknown, double *of_row) {
   for (size_t j = 0; j < s->n; j++) of_unknown[j] = 0;
   for (size_t i = 0; i < s->n; i++)
     for (size_t e = s->h.starts[i]; e < s->h.starts[i + 1]; e++)
-      of_unknown[i] = fmax(of_unknown[i], fabs(s->h.values[e]) * s->e[i] * s->e[s->h.indices[e]]);
+      of_unknown[i] = qp_larger(of_unknown[i], fabs(s->h.values[e]) * s->e[i] * s->e[s->h.indices[e]]);
   for (size_t k = 0; k < s->general; k++) {
     of_row[k] = 0;
     for (size_t e = s->c.starts[k]; e < s->c.starts[k + 1]; e++) {
       double entry = fabs(s->c.values[e]) * s->f[k] * s->e[s->c.indices[e]];
-      of_row[k] = fmax(of_row[k], entry);
-      of_unknown[s->c.indices[e]] = fmax(of_unknown[s->c.indices[e]], entry);
+      of_row[k] = qp_larger(of_row[k], entry);
+      of_unknown[s->c.indices[e]] = qp_larger(of_unknown[s->c.indices[e]], entry);
     }
   }
 }
@@ -93,11 +93,11 @@ static double objective_unit(const qp_scaled *s, const double *g) {
   for (size_t i = 0; i < s->n; i++) {
     double column = 0;
     for (size_t e = s->h.starts[i]; e < s->h.starts[i + 1]; e++)
-      column = fmax(column, fabs(s->h.values[e]) * s->e[i] * s->e[s->h.indices[e]]);
+      column = qp_larger(column, fabs(s->h.values[e]) * s->e[i] * s->e[s->h.indices[e]]);
     sum += column;
-    top = fmax(top, fabs(g[i]) * s->e[i]);
+    top = qp_larger(top, fabs(g[i]) * s->e[i]);
   }
-  double size = fmax(s->n ? sum / (double)s->n : 0, top);
+  double size = qp_larger(s->n ? sum / (double)s->n : 0, top);
   return size > 0 ? batten_unit(size) : 1;
 }
 

@@ -19,6 +19,9 @@ typedef struct qp_scaled {
   size_t bytes;
 } qp_scaled;
 
+/* The larger; a where b is no number. Inline, where fmax() is a call. */
+static inline double qp_larger(double a, double b) { return a < b ? b : a; }
+
 /* Free with qp_scaled_free, also after NOMEM or TOO_LARGE. */
 batten_status qp_scaled_new(batten_context *ctx, const qp_sparse *objective, const qp_rows *rows, qp_scaled *out);
 void qp_scaled_free(batten_context *ctx, qp_scaled *s);
