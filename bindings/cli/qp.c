@@ -39,7 +39,8 @@ static const cli_option table[] = {
      "residuals and gap within T + T times their scale count as solved; default\n1e-9"},
     {"exact", OPT_EXACT, NULL, "move x until every inequality holds exactly in floating point"},
     {"start", OPT_START, "FILE",
-     "start from x and active set of an earlier solution (.json of -o), also of a\nslightly other problem of the same size"},
+     "start from x and active set of an earlier solution (.json of -o), also of a\nslightly other problem of the "
+     "same size"},
     {"time-limit", OPT_TIME_LIMIT, "S", "stop after so many seconds, with the best feasible point; default none"},
     {"iterations", OPT_ITERATIONS, "N", "stop after so many pivots or interior steps; default by size, generous"},
     {"memory", OPT_MEMORY, "SIZE", "use at most so much, for instance 2G; default 90 % of what the machine has"},

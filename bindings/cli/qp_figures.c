@@ -259,6 +259,7 @@ static void append_proof(const qp_work *w, char *text, size_t size, bool sides) 
   size_t index[NAMED], n = w->counts.unknowns, m = w->counts.rows;
   const double *values = sides ? w->solution.certificate : w->solution.ray;
   size_t found = largest(values, sides ? m + n : n, index);
+  if (sides) append(text, size, found > 1 ? "; these contradict each other:" : "; this cannot hold, whatever x is:");
   for (size_t k = 0; k < found && k < NAMED; k++) {
     append(text, size, k ? ", " : " ");
     if (sides)
@@ -280,7 +281,6 @@ void qp_explain(const qp_work *w, char *text, size_t size) {
   }
   append(text, size, "%s", batten_status_text(w->status));
   if (w->status == BATTEN_E_INFEASIBLE) {
-    append(text, size, "; these contradict each other:");
     append_proof(w, text, size, true);
   } else if (w->status == BATTEN_E_UNBOUNDED) {
     append(text, size, " along");

@@ -565,6 +565,15 @@ static batten_status finish_rows(qps_reader *q) {
   return st;
 }
 
+/* Only now, as bounds come in any order. */
+static batten_status crossed(qps_reader *q, size_t j) {
+  char quote[BX_QUOTE_SIZE];
+  const char *name = bx_names_get(&q->column_names, j);
+  return batten_fail(
+      q->r->ctx, BATTEN_E_FORMAT, "%s: column '%s': its lower bound %.17g exceeds its upper bound %.17g",
+      bx_short_path(q->r->path), bx_quote(name, strlen(name), quote), q->columns[j].lower, q->columns[j].upper);
+}
+
 static batten_status finish_columns(qps_reader *q) {
   batten_context *ctx = q->r->ctx;
   bx_qp_store *s = q->store;
@@ -573,9 +582,11 @@ static batten_status finish_columns(qps_reader *q) {
   if (!(s->x_lower = batten_alloc_array(ctx, n, sizeof *s->x_lower))) return BATTEN_E_NOMEM;
   if (!(s->x_upper = batten_alloc_array(ctx, n, sizeof *s->x_upper))) return BATTEN_E_NOMEM;
   for (size_t j = 0; j < n; j++) {
-    s->g[j] = q->maximise ? 0 - q->columns[j].g : q->columns[j].g;
-    s->x_lower[j] = q->columns[j].lower;
-    s->x_upper[j] = q->columns[j].upper;
+    const qps_column *x = &q->columns[j];
+    if (x->lower > x->upper) return crossed(q, j);
+    s->g[j] = q->maximise ? 0 - x->g : x->g;
+    s->x_lower[j] = x->lower;
+    s->x_upper[j] = x->upper;
   }
   if (q->maximise) q->constant = 0 - q->constant;
   return BATTEN_OK;

@@ -178,6 +178,8 @@ value = 4 * y[0] + 1 * y[1] + 2 * y[3]
 sys.exit(not (d["status"] == "infeasible" and max(map(abs, zero)) < 1e-9 and abs(value - 1) < 1e-9 and "x" not in d))
 PY
 ok $? "the certificate is one"
+qp zero.json '"g": [0], "C": [[0]], "lower": [1]'
+run 1 "zero.json: no point satisfies the constraints; this cannot hold, whatever x is: r1 >= 1 (times 1)" qp zero.json
 qp unb.json '"H": [[1, 0], [0, 0]], "g": [0, -1], "x_lower": [0, 0]'
 run 1 "unb.json: the objective falls without end along x2 (+1); bound these unknowns" qp unb.json -o unb-s.json --report unb-r.json
 is unb-r.json status unbounded

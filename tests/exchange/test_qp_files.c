@@ -358,7 +358,8 @@ static void test_solutions_read(batten_context *ctx, scratch *folder) {
        "qp_solution: 3 numbers in 'x', but the problem has 2 unknowns; is it the solution of another one?"},
       {SOLUTION(ACTIVE "[0, 0]"), "qp_solution: 2 numbers in 'active', but the problem has 3 rows and unknowns"},
       {SOLUTION(ACTIVE "1"), "qp_solution.active: a number, where an array is expected"},
-      {SOLUTION(ACTIVE "[0, 0, -2]"), "qp_solution.active[2]: -2, where -1 (lower side), 1 (upper), 2 (equality) or 0"},
+      {SOLUTION(ACTIVE "[0, 0, -2]"),
+       "qp_solution.active[2]: -2, where -1 (lower side), 1 (upper), 2 (equality) or 0"},
       {SOLUTION(ACTIVE "[0, 0.5, 0]"), "qp_solution.active[1]: 0.5, where"},
       {SOLUTION(ACTIVE "[0, null, 0]"), "qp_solution.active[1]: null, where a number is expected"},
   };
@@ -431,6 +432,8 @@ static const struct {
     {"a.qps", HEAD "BOUNDS\n SC B x 1\n", "a.qps:10: SC asks for a semi-continuous unknown"},
     {"a.qps", HEAD "BOUNDS\n UP B x one\n", "a.qps:10: the bound: 'one' is not a number"},
     {"a.qps", HEAD "BOUNDS\n LO B x 1e20\n", "a.qps:10: a bound LO of inf leaves nothing"},
+    {"a.qps", HEAD "BOUNDS\n LO B x 5\n UP B x 4\nENDATA\n",
+     "a.qps: column 'x': its lower bound 5 exceeds its upper bound 4"},
     {"a.qps", HEAD "BOUNDS\n UP\n", "a.qps:10: a line of BOUNDS has a type"},
     {"a.qps", HEAD "QUADOBJ\n x z 1\n", "a.qps:10: column 'z' is not in COLUMNS"},
     {"a.qps", HEAD "QUADOBJ\n z x 1\n", "a.qps:10: column 'z' is not in COLUMNS"},
