@@ -283,7 +283,7 @@ static inline qp_scene_spec qp_scene_spec_random(uint64_t number, size_t most_n,
   uint64_t seed = number * 0x9e3779b97f4a7c15u + 1;
   qp_scene_spec p = {.seed = number};
   double u = scene_uniform(&seed), w = scene_uniform(&seed);
-  p.n = 2 + (size_t)((double)(most_n - 2) * pow(u, 6));
+  p.n = (size_t)(2 * pow((double)(most_n + 1) / 2, u * u));
   double least = 1 + (double)p.n / 2;
   p.m = (size_t)(least * pow(fmax((double)most_m / least, 1), w * w));
   p.condition = pow(10, 10 * scene_uniform(&seed));

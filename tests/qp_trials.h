@@ -32,8 +32,10 @@ typedef struct qp_trial_result {
 /* Scales below this are those of a problem that is nearly nothing; all data are of size one. */
 #define QP_TRIAL_LEAST 0.01
 
-static inline double qp_trial_allowed(const qp_scene_spec *spec, const qp_verdict *v) {
-  return 10 * (double)spec->n * 0x1p-52 * spec->condition * (1 + v->dual_scale);
+/* Rounding in x; and that of the data, by which the known solution itself misses to be one. */
+static inline double qp_trial_allowed(const qp_scene_spec *spec, const qp_verdict *v, const qp_verdict *known) {
+  double n = (double)spec->n;
+  return spec->condition * (10 * n * 0x1p-52 * (1 + v->dual_scale) + sqrt(n) * known->dual);
 }
 
 static inline qp_trial_result qp_trial_judge(const qp_scene_spec *spec, const qp_scene *s, batten_qp_engine engine,
@@ -47,9 +49,9 @@ static inline qp_trial_result qp_trial_judge(const qp_scene_spec *spec, const qp
   r.gap = r.verdict.gap / fmax(r.verdict.gap_scale, QP_TRIAL_LEAST);
   double off = 0;
   for (size_t j = 0; j < spec->n; j++) off = fmax(off, fabs(x[j] - s->x[j]));
-  r.off = off / qp_trial_allowed(spec, &r.verdict);
+  qp_verdict known = qp_check(&s->problem, s->x, s->y);
+  r.off = off / qp_trial_allowed(spec, &r.verdict, &known);
   if (spec->null || (engine == BATTEN_QP_INTERIOR && spec->n > HANDED_OVER)) {
-    qp_verdict known = qp_check(&s->problem, s->x, s->y);
     r.off = fabs(r.verdict.objective - known.objective) / (1e-9 * fmax(known.gap_scale, QP_TRIAL_LEAST));
   }
   r.passed = status == BATTEN_OK && qp_check_within(&r.verdict, 1e-9, QP_TRIAL_LEAST) && r.off <= 1;

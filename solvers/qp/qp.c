@@ -87,15 +87,28 @@ static void judge(solver *s, const qp_point *point, batten_qp_info *info) {
   qp_certify_residuals(s->problem, point->x, s->y, s->work, info);
 }
 
-/* Keeps the point under way when it is better than the best so far. */
-static void consider(solver *s, batten_qp_engine engine) {
+/* Rounding of x and y themselves: no engine can do better. Tolerances may be out of reach by then. */
+static const double ROUNDING = 1e-14;
+
+static bool within(const batten_qp_info *f, double level) {
+  return f->primal_residual <= level * f->primal_scale && f->dual_residual <= level * f->dual_scale &&
+         f->duality_gap <= level * f->gap_scale;
+}
+
+static bool at_rounding(const solver *s) { return s->found && within(&s->info, ROUNDING); }
+
+/* Keeps the point under way when it is better than the best so far. Of residuals that are rounding none is better; then
+ * the minimiser on a working set goes before the end of a path, which is off by the root of its residuals where
+ * multipliers are 0. */
+static void consider(solver *s, batten_qp_engine engine, bool on_working_set) {
   size_t m = s->pre.rows.m;
   if (batten_first_nonfinite(s->n, s->point.x) < s->n) return;
   if (batten_first_nonfinite(m, s->point.y) < m) memset(s->point.y, 0, m * sizeof *s->point.y);
   clean(s, &s->point);
   batten_qp_info info = s->info;
   judge(s, &s->point, &info);
-  if (s->found && !(merit(&info, s->o) < merit(&s->info, s->o))) return;
+  bool instead = on_working_set && s->info.engine == BATTEN_QP_INTERIOR && within(&info, ROUNDING);
+  if (s->found && !instead && !(merit(&info, s->o) < merit(&s->info, s->o))) return;
   s->found = true;
   s->info = info;
   s->info.engine = engine;
@@ -186,7 +199,7 @@ static batten_status try_unbounded(solver *s) {
     if (s->proof < 0) return BATTEN_OK;
     memset(s->point.y, 0, s->pre.rows.m * sizeof *s->point.y);
     s->found = false; /* whatever its merit: feasible is all that counts now */
-    consider(s, BATTEN_QP_INTERIOR);
+    consider(s, BATTEN_QP_INTERIOR, false);
   }
   if (s->proof == BATTEN_OK && feasible(s)) s->proof = BATTEN_E_UNBOUNDED;
   return BATTEN_OK;
@@ -222,20 +235,11 @@ static batten_status run(solver *s, batten_qp_engine engine, beginning from) {
     default:
       return st;
   }
-  consider(s, engine);
+  consider(s, engine, engine != BATTEN_QP_INTERIOR);
   return st == BATTEN_E_UNBOUNDED ? try_unbounded(s) : BATTEN_OK;
 }
 
 /* ---- The last digits ---- */
-
-static bool within(const solver *s, double level) {
-  const batten_qp_info *f = &s->info;
-  return s->found && f->primal_residual <= level * f->primal_scale && f->dual_residual <= level * f->dual_scale &&
-         f->duality_gap <= level * f->gap_scale;
-}
-
-/* Rounding of x and y themselves: no engine can do better. Tolerances may be out of reach by then. */
-static bool at_rounding(const solver *s) { return within(s, 1e-14); }
 
 /* Whether the plan's engine i may bring something: the nearer the best so far is, the less it may cost. */
 static bool worth_trying(const solver *s, size_t i) {
@@ -251,7 +255,8 @@ static batten_status polish(solver *s, bool *refused) {
   double error;
   *refused = false;
   if (!s->found || s->proof < 0 || s->stop < 0 || s->n == 0) return BATTEN_OK;
-  if (at_rounding(s) || (optimal(s) && s->n > SMALL && within(s, ENOUGH))) return BATTEN_OK;
+  bool path_end = s->info.engine == BATTEN_QP_INTERIOR && s->n <= SMALL;
+  if (!path_end && (at_rounding(s) || (optimal(s) && within(&s->info, ENOUGH)))) return BATTEN_OK;
   if (s->info.engine == BATTEN_QP_INTERIOR && !s->o->hand_over) return BATTEN_OK;
   if (!s->plan.dense_affordable || s->n > (optimal(s) ? CHEAP : MOST)) return BATTEN_OK;
   batten_status st = qp_dense_factor(s->ctx, &s->task, s->point.ray);
@@ -261,7 +266,7 @@ static batten_status polish(solver *s, bool *refused) {
   st = qp_refine(s->ctx, &s->task, &s->point, &error);
   if (st < 0) return st == BATTEN_E_NOMEM ? st : BATTEN_OK;
   *refused = !(error < INFINITY);
-  if (!*refused) consider(s, s->info.engine);
+  if (!*refused) consider(s, s->info.engine, true);
   return BATTEN_OK;
 }
 
