@@ -15,7 +15,7 @@
 #include "base/checked.h"
 
 /* Relative residuals of Newton systems: for a look ahead, and for a step to take. */
-static const double ROUGH = 1e-3, FINE = 1e-12;
+static const double ROUGH = 1e-3, FINE = 1e-6;
 
 typedef struct ip {
   const qp_scaled *s;
