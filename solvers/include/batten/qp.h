@@ -6,7 +6,7 @@
  * Three engines behind one call. Two are dense, for up to some hundred unknowns and very many rows: a dual active set
  * [Goldfarb, Idnani 1983] on the triangular factor of the objective, and a primal active set [Fletcher, Practical
  * Methods of Optimization, ch. 10] whose every iterate is feasible. The third is a proximal interior point on banded
- * Cholesky factors, for hundreds to 1e5 unknowns. Whatever the engine, the result is judged by residuals that are
+ * or sparse factors, for hundreds to 1e5 unknowns. Whatever the engine, the result is judged by residuals that are
  * recomputed from the caller's own data by code that the engines do not share, and only what passes is BATTEN_OK. */
 #ifndef BATTEN_QP_H
 #define BATTEN_QP_H
@@ -119,10 +119,11 @@ BATTEN_API void batten_qp_workspace_free(batten_qp_workspace *workspace);
  *   BATTEN_E_INFEASIBLE no x satisfies the rows; proven by certificate
  *   BATTEN_E_UNBOUNDED  the objective falls without end; proven by ray
  *   BATTEN_E_NOT_CONVEX H is not positive semidefinite; proven by ray and not_convex_index
- *   BATTEN_E_LIMIT      a limit was met before a feasible point was known
+ *   BATTEN_E_LIMIT      a limit was met before a feasible point was known, or no engine found a point
  * Other failures: INVALID, TOO_LARGE, NOMEM, CANCELLED (no feasible point was known).
  * Cost: dense engines O(k n^2 + n^3) to factor, then about 2 m n for a pass over all rows (some five to ten passes) and
- * 6 n^2 for a pivot; interior point: about 20 steps of n * bandwidth^2. Bytes: batten_qp_bytes. */
+ * 10 n^2 (dual) to 26 n^2 (primal) for a pivot; interior point: about 25 steps of n * bandwidth^2, or of a sparse factor.
+ * Bytes: batten_qp_bytes. Threads: one call per context and workspace at a time; inputs are only read. */
 BATTEN_API batten_status batten_qp_solve(batten_context *ctx, const batten_qp_problem *problem,
                                          const batten_qp_options *opt, batten_qp_workspace *workspace,
                                          batten_qp_solution *solution, batten_qp_info *info);
