@@ -1,6 +1,6 @@
-/* Factorised working set, see active.h. Single members are added and dropped by loops over contiguous columns: at the
- * sizes where the dense engines are best (n below 100) a call into BLAS costs more than it saves. Sets that are known
- * at once go through LAPACK. */
+/* Factorised working set, see active.h. Single members are added and dropped by loops over contiguous columns
+ * (lanes.h): at the sizes where the dense engines are best (n below 100) a call into BLAS costs more than it saves.
+ * Sets that are known at once go through LAPACK. */
 #include "active.h"
 
 #include <float.h>
@@ -8,8 +8,7 @@
 
 #include "base/checked.h"
 #include "la/la.h"
-
-static const size_t WORTH_BLAS = 96;
+#include "lanes.h"
 
 /* Four running sums, so that the order of additions is fixed and the loop fills vector registers. */
 static double dot(size_t n, const double *a, const double *b) {
@@ -92,10 +91,7 @@ void qp_active_reset(qp_active *set, const double *c) {
 /* ---- Products ---- */
 
 void qp_active_project_vector(const qp_active *set, const double *v, double *d) {
-  if (set->n < WORTH_BLAS)
-    for (size_t j = 0; j < set->n; j++) d[j] = dot(set->n, set->j + j * set->n, v);
-  else
-    batten_la_gemv(BATTEN_LA_DOUBLE, 'T', set->n, set->n, 1, set->j, set->n, v, 0, d);
+  qp_lanes_now()->dots(set->n, set->n, set->j, set->n, v, d);
 }
 
 void qp_active_project(const qp_active *set, size_t k, double *d) {
@@ -117,17 +113,7 @@ void qp_active_project(const qp_active *set, size_t k, double *d) {
 
 void qp_active_combine(const qp_active *set, size_t first, size_t last, double factor, const double *u,
                        double *restrict x) {
-  size_t n = set->n, j = first;
-  if (n >= WORTH_BLAS) {
-    batten_la_gemv(BATTEN_LA_DOUBLE, 'N', n, last - first, factor, set->j + first * n, n, u + first, 1, x);
-    return;
-  }
-  for (; j + 4 <= last; j += 4) { /* four columns for each time that x is loaded and stored */
-    const double *a = set->j + j * n, *b = a + n, *c = b + n, *d = c + n;
-    double p = factor * u[j], q = factor * u[j + 1], r = factor * u[j + 2], s = factor * u[j + 3];
-    for (size_t i = 0; i < n; i++) x[i] += (p * a[i] + q * b[i]) + (r * c[i] + s * d[i]);
-  }
-  for (; j < last; j++) axpy(n, factor * u[j], set->j + j * n, x);
+  qp_lanes_now()->combine(set->n, last - first, set->j + first * set->n, set->n, factor, u + first, x);
 }
 
 void qp_active_solve(const qp_active *set, const double *d, double *y) {
@@ -183,17 +169,15 @@ void qp_active_add(qp_active *set, size_t k, signed char side, double *d) {
   double *w = set->scratch;
   memset(w, 0, n * sizeof *w);
   qp_active_combine(set, q, n, tau, d, w);
-  for (size_t j = q; j < n; j++) axpy(n, -d[j], w, set->j + j * n);
+  qp_lanes_now()->subtract(n, n - q, set->j + q * n, n, w, d + q);
   axpy(n - q, -tau * dot(n - q, v, set->target + q), v, set->target + q);
 }
 
-/* Rotates the pair (a, b) of vectors: a := c a + s b, b := c b - s a. */
-static void rotate(size_t n, double c, double s, double *restrict a, double *restrict b) {
-  for (size_t i = 0; i < n; i++) {
-    double x = a[i], y = b[i];
-    a[i] = c * x + s * y;
-    b[i] = c * y - s * x;
-  }
+/* lanes.h's, of two numbers. */
+static void rotate_pair(double c, double s, double *a, double *b) {
+  double x = *a, y = *b;
+  *a = c * x + s * y;
+  *b = c * y - s * x;
 }
 
 void qp_active_drop(qp_active *set, size_t place) {
@@ -206,9 +190,9 @@ void qp_active_drop(qp_active *set, size_t place) {
     set->side[i] = set->side[i + 1];
     double length = hypot(column[i], column[i + 1]), c = column[i] / length, s = column[i + 1] / length;
     column[i] = length;
-    for (size_t l = i + 2; l <= last; l++) rotate(1, c, s, set->t + i + l * n, set->t + i + 1 + l * n);
-    rotate(n, c, s, set->j + i * n, set->j + (i + 1) * n);
-    rotate(1, c, s, set->target + i, set->target + i + 1);
+    for (size_t l = i + 2; l <= last; l++) rotate_pair(c, s, set->t + i + l * n, set->t + i + 1 + l * n);
+    qp_lanes_now()->rotate(n, c, s, set->j + i * n, set->j + (i + 1) * n);
+    rotate_pair(c, s, set->target + i, set->target + i + 1);
   }
 }
 

@@ -2,13 +2,15 @@
  *
  * Sums run in twice the working precision [Ogita, Rump, Oishi 2005, Dot2]: each product and each addition keeps its
  * rounding error, by fma() and by Knuth's TwoSum, so that bits are the same with and without FMA units. Rows that a
- * plain sum shows to hold by more than its error bound are not summed again. Nothing here is shared with the engines.
- * See certify.h. */
+ * plain sum shows to hold by more than its error bound are not summed again. Nothing here is shared with the engines;
+ * judge_sums.c has its loops over rows. See certify.h. */
 #include "certify.h"
 
 #include <float.h>
 #include <math.h>
 #include <string.h>
+
+#include "judge_sums.h"
 
 /* Relative size below which a quantity that should vanish, or one that should be positive, is put down to rounding in
  * the data and in the engine: entries may be sums of some thousand products. */
@@ -69,41 +71,21 @@ static size_t column_of(const line *l, size_t e) { return l->columns ? l->column
 static exact dot(const batten_matrix *m, size_t i, const double *x) {
   line l = line_of(m, i);
   exact sum = {0, 0};
-  for (size_t e = 0; e < l.count; e++) sum = plus_product(sum, l.values[e], x[column_of(&l, e)]);
-  return normal(sum);
+  if (l.count > 0) qp_judge_sums_now()->twice(l.count, l.values, l.columns, x, &sum.hi, &sum.lo);
+  return sum;
 }
 
 /* Plain sum of products, and of their absolute values. */
 static double plain_dot(const batten_matrix *m, size_t i, const double *x, double *size) {
   line l = line_of(m, i);
-  double s[4] = {0}, t[4] = {0};
-  size_t e = 0;
-  if (!l.columns) {
-    for (; e + 4 <= l.count; e += 4) {
-      for (size_t q = 0; q < 4; q++) {
-        double product = l.values[e + q] * x[e + q];
-        s[q] += product;
-        t[q] += fabs(product);
-      }
-    }
-  }
-  for (; e < l.count; e++) {
-    double product = l.values[e] * x[column_of(&l, e)];
-    s[0] += product;
-    t[0] += fabs(product);
-  }
-  *size = (t[0] + t[1]) + (t[2] + t[3]);
-  return (s[0] + s[1]) + (s[2] + s[3]);
+  *size = 0;
+  return l.count > 0 ? qp_judge_sums_now()->plain(l.count, l.values, l.columns, x, size) : 0;
 }
 
 /* (hi, lo) [n] += factor * row i */
 static void add_row(const batten_matrix *m, size_t i, exact factor, double *hi, double *lo) {
   line l = line_of(m, i);
-  for (size_t e = 0; e < l.count; e++) {
-    size_t j = column_of(&l, e);
-    exact sum = plus_multiple((exact){hi[j], lo[j]}, l.values[e], factor);
-    hi[j] = sum.hi, lo[j] = sum.lo;
-  }
+  if (l.count > 0) qp_judge_sums_now()->add(l.count, l.values, l.columns, factor.hi, factor.lo, hi, lo);
 }
 
 static void add_plain(const batten_matrix *m, size_t i, double factor, double *to) {

@@ -222,7 +222,7 @@ static batten_status asymmetric(batten_context *ctx, size_t i, size_t j, double 
 /* 10 eps of the largest entry: what a product such as B'B in floating point is off by. */
 static double asymmetry_allowed(size_t count, const double *values) {
   double most = 0;
-  for (size_t e = 0; e < count; e++) most = fmax(most, fabs(values[e]));
+  for (size_t e = 0; e < count; e++) most = fabs(values[e]) > most ? fabs(values[e]) : most;
   return 10 * DBL_EPSILON * most;
 }
 

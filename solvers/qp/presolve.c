@@ -13,6 +13,7 @@
 #include <string.h>
 
 #include "base/checked.h"
+#include "lanes.h"
 #include "matrix_row.h"
 
 static const size_t NONE = SIZE_MAX;
@@ -60,26 +61,19 @@ static void count_entries(const qp_matrix_row *row, direction *d) {
   }
 }
 
-/* Sums of a_j^2 and a_j r_j of a * unit, four at a time. */
+/* Sums of a_j^2 and a_j r_j of a * unit. */
 static void sums_of_row(const qp_matrix_row *row, const double *random, double unit, double *square, double *along) {
-  double s[4] = {0}, t[4] = {0};
-  size_t e = 0;
-  if (!row->columns) {
-    for (; e + 4 <= row->count; e += 4) {
-      for (size_t q = 0; q < 4; q++) {
-        double a = row->values[e + q] * unit;
-        s[q] += a * a;
-        t[q] += a * random[e + q];
-      }
-    }
+  double s = 0, t = 0;
+  if (!row->columns && unit == 1) {
+    qp_lanes_now()->squares(row->count, row->values, random, square, along);
+    return;
   }
-  for (; e < row->count; e++) {
+  for (size_t e = 0; e < row->count; e++) {
     double a = row->values[e] * unit;
-    s[0] += a * a;
-    t[0] += a * random[qp_row_column(row, e)];
+    s += a * a;
+    t += a * random[qp_row_column(row, e)];
   }
-  *square = (s[0] + s[1]) + (s[2] + s[3]);
-  *along = (t[0] + t[1]) + (t[2] + t[3]);
+  *square = s, *along = t;
 }
 
 static direction direction_of(const qp_matrix_row *row, const double *random) {

@@ -7,14 +7,14 @@
 #include <string.h>
 
 #include "base/checked.h"
-#include "la/la.h"
+#include "lanes.h"
 
-enum { CANDIDATES = 64 };
+enum { CANDIDATES = 32 };
 
 /* A pass is over when the farthest candidate is below this share of the first one's distance: rows that are no
  * candidates are then likely to be farther. The dearer a pass is beside a pivot (m / n), the longer its candidates
  * are used: to the end for very many rows. */
-static double last_share(const qp_rows *rows) { return fmin(0.25, 5 * (double)rows->n / (double)rows->m); }
+static double last_share(const qp_rows *rows) { return fmin(0.1, 5 * (double)rows->n / (double)rows->m); }
 
 /* Two times the worst error of a product of four terms or less, far below that of long rows, where errors seldom add
  * up. */
@@ -22,8 +22,7 @@ static const double FEASIBILITY = 8 * DBL_EPSILON;
 
 /* ---- Life ---- */
 
-/* Rows whose products are one call of BLAS and one task: 8192 entries, for which BLAS stays on the thread that calls
- * it. */
+/* Rows whose products are one call and one task. */
 static size_t block_rows(const qp_rows *rows) { return 8192 / (rows->n > 0 ? rows->n : 1); }
 
 /* Their weights cost as much as many pivots: fewer where there are few rows. */
@@ -43,8 +42,9 @@ static size_t chunk_rows(const qp_rows *rows) {
 /* Numbers that pricing keeps; false when they are too many to count. */
 static bool count_doubles(const qp_rows *rows, size_t chunks, size_t *doubles) {
   size_t most = candidates_most(rows), copies;
-  bool fits = batten_mul3(2, most, rows->n, &copies);
+  bool fits = batten_mul(most, rows->n, &copies);
   fits = batten_add(copies, rows->n + chunks + 2 * most, doubles) && fits;
+  fits = batten_add(*doubles, rows->m, doubles) && fits;
   return batten_add(*doubles, rows->m, doubles) && fits;
 }
 
@@ -60,18 +60,20 @@ batten_status qp_pricing_new(batten_context *ctx, const qp_rows *rows, const sig
     return batten_fail(ctx, BATTEN_E_TOO_LARGE, "%zu constraints of %zu unknowns", m, n);
   p->last = batten_alloc_array(ctx, doubles, sizeof *p->last);
   if (!p->last) return BATTEN_E_NOMEM;
-  p->offer = batten_alloc_array(ctx, p->chunks + most, sizeof *p->offer);
+  p->offer = batten_alloc_array(ctx, p->chunks + 2 * most, sizeof *p->offer);
   if (!p->offer) return BATTEN_E_NOMEM;
   p->skip = batten_alloc_array(ctx, most, sizeof *p->skip);
   if (!p->skip) return BATTEN_E_NOMEM;
   p->safe_till = p->last + n;
-  p->offer_by = p->safe_till + m;
+  p->known = p->safe_till + m;
+  p->offer_by = p->known + m;
   p->product = p->offer_by + p->chunks;
   p->weight = p->product + most;
   p->copy = p->weight + most;
-  p->work = p->copy + most * n;
   p->candidate = p->offer + p->chunks;
+  p->fresh = p->candidate + most;
   memset(p->last, 0, n * sizeof *p->last);
+  memset(p->known, 0, m * sizeof *p->known);
   for (size_t k = 0; k < m; k++) p->safe_till[k] = qp_rows_is_equality(rows, k) ? INFINITY : -1;
   return BATTEN_OK;
 }
@@ -86,7 +88,7 @@ void qp_pricing_free(batten_context *ctx, qp_pricing *p) {
 size_t qp_pricing_bytes(const qp_rows *rows) {
   size_t chunks = rows->m / chunk_rows(rows) + 1, all;
   count_doubles(rows, chunks, &all);
-  batten_add(all, chunks + 2 * candidates_most(rows), &all);
+  batten_add(all, chunks + 3 * candidates_most(rows), &all);
   batten_mul(all, sizeof(double), &all);
   return all;
 }
@@ -129,36 +131,45 @@ typedef struct pass {
   const double *x;
 } pass;
 
+/* Rows first .. first + count - 1 of one chunk make its offer. known: their products are in till. */
+static void price_chunk(const pass *job, size_t chunk, size_t first, size_t count, bool known) {
+  qp_pricing *p = job->p;
+  const qp_rows *rows = p->rows;
+  double keep = p->path * (1 - 4 * DBL_EPSILON), most = 0;
+  size_t offer = SIZE_MAX;
+  for (size_t k = first; k < first + count; k++) {
+    double *till = &p->safe_till[k];
+    if (qp_rows_is_equality(rows, k)) *till = INFINITY;
+    if (*till == INFINITY || (!known && *till > p->path)) continue;
+    double product = known ? *till : qp_rows_dot(rows, k, job->x), slack = slack_at(rows, k, product);
+    signed char side;
+    *till = slack + keep;
+    if (!(-slack > most) || p->active[k] != QP_FREE) continue;
+    double violation = qp_pricing_violation(p, k, product, job->x, &side);
+    if (violation <= most) continue;
+    offer = k;
+    most = violation;
+  }
+  p->offer[chunk] = offer;
+  p->offer_by[chunk] = most;
+}
+
 static void price_block(void *arg, size_t index) {
   const pass *job = arg;
   qp_pricing *p = job->p;
   const qp_rows *rows = p->rows;
   size_t block = p->chunk * p->per_block, first = index * block, left = rows->m - first;
   size_t count = left < block ? left : block, due = 0;
-  double *till = p->safe_till + first, keep = p->path * (1 - 4 * DBL_EPSILON);
-  for (size_t i = index * p->per_block; i < p->chunks && i < (index + 1) * p->per_block; i++) {
-    p->offer[i] = SIZE_MAX;
-    p->offer_by[i] = 0;
-  }
+  double *till = p->safe_till + first;
   for (size_t i = 0; i < count; i++) due += till[i] > p->path ? 0 : 1;
-  if (due == 0) return;
-
   /* A product in a run of rows costs a third of one by itself. */
   bool all = due > count / 3;
   if (all) qp_rows_times(rows, first, count, job->x, till);
-  for (size_t i = 0; i < count; i++) {
-    size_t k = first + i, to = k / p->chunk;
-    if (qp_rows_is_equality(rows, k)) till[i] = INFINITY;
-    if (till[i] == INFINITY || (!all && till[i] > p->path)) continue;
-    double product = all ? till[i] : qp_rows_dot(rows, k, job->x);
-    signed char side;
-    double slack = slack_at(rows, k, product);
-    till[i] = slack + keep;
-    if (!(-slack > p->offer_by[to]) || p->active[k] != QP_FREE) continue;
-    double violation = qp_pricing_violation(p, k, product, job->x, &side);
-    if (violation <= p->offer_by[to]) continue;
-    p->offer[to] = k;
-    p->offer_by[to] = violation;
+  for (size_t chunk = index * p->per_block, done = 0; done < count; chunk++, done += p->chunk) {
+    p->offer[chunk] = SIZE_MAX;
+    p->offer_by[chunk] = 0;
+    if (due == 0) continue;
+    price_chunk(job, chunk, first + done, count - done < p->chunk ? count - done : p->chunk, all);
   }
 }
 
@@ -185,6 +196,45 @@ static void select_largest(size_t *rows, double *by, size_t count, size_t most) 
   }
 }
 
+static void copy_row(const qp_rows *rows, size_t k, double *to) {
+  const double *values;
+  const uint32_t *columns;
+  size_t count = qp_rows_entries(rows, k, &values, &columns);
+  double scale = rows->scale[k];
+  if (columns) {
+    memset(to, 0, rows->n * sizeof *to);
+    for (size_t e = 0; e < count; e++) to[columns[e]] = scale * values[e];
+  } else {
+    for (size_t j = 0; j < count; j++) to[j] = scale * values[j];
+  }
+}
+
+/* Weights of candidates, which are kept: many come back pass after pass. R^-T a_k by blocks of columns of R^-1, which
+ * stay in cache from candidate to candidate and have nothing below their last row. */
+static void weigh(qp_pricing *p) {
+  enum { COLUMNS = 8 };
+  size_t n = p->rows->n, fresh = 0;
+  double *square = p->product; /* what it holds is made anew before it is asked for */
+  for (size_t i = 0; i < p->count; i++) {
+    p->weight[i] = p->known[p->candidate[i]];
+    if (p->weight[i] > 0) continue;
+    p->fresh[fresh] = i;
+    square[fresh++] = 0;
+  }
+  for (size_t j = 0; j < n && fresh > 0; j += COLUMNS) {
+    size_t columns = n - j < COLUMNS ? n - j : COLUMNS;
+    for (size_t f = 0; f < fresh; f++) {
+      double part[COLUMNS];
+      qp_lanes_now()->dots(j + columns, columns, p->inverse + j * n, n, p->copy + p->fresh[f] * n, part);
+      for (size_t c = 0; c < columns; c++) square[f] += part[c] * part[c];
+    }
+  }
+  for (size_t f = 0; f < fresh; f++) {
+    size_t i = p->fresh[f];
+    p->weight[i] = p->known[p->candidate[i]] = 1 / sqrt(square[f]);
+  }
+}
+
 static void gather(qp_pricing *p) {
   const qp_rows *rows = p->rows;
   size_t n = rows->n, most = candidates_most(rows), count = 0;
@@ -199,18 +249,12 @@ static void gather(qp_pricing *p) {
   }
   p->count = count;
   p->first = 0;
-  memset(p->copy, 0, count * n * sizeof *p->copy);
   for (size_t i = 0; i < count; i++) {
     p->candidate[i] = p->offer[i];
     p->skip[i] = false;
-    qp_rows_add(rows, p->candidate[i], 1, p->copy + i * n);
+    copy_row(rows, p->candidate[i], p->copy + i * n);
   }
-  batten_la_gemm(BATTEN_LA_DOUBLE, 'T', 'N', n, count, n, 1, p->inverse, n, p->copy, n, 0, p->work, n);
-  for (size_t i = 0; i < count; i++) {
-    double square = 0;
-    for (size_t j = 0; j < n; j++) square += p->work[i * n + j] * p->work[i * n + j];
-    p->weight[i] = 1 / sqrt(square);
-  }
+  weigh(p);
 }
 
 bool qp_pricing_pass(batten_context *ctx, qp_pricing *p, const double *x) {
@@ -243,7 +287,7 @@ size_t qp_pricing_worst(qp_pricing *p, const double *x) {
   double most = 0;
   signed char side;
   p->length = length(rows->n, x);
-  batten_la_gemv(BATTEN_LA_DOUBLE, 'T', rows->n, p->count, 1, p->copy, rows->n, x, 0, p->product);
+  qp_lanes_now()->dots(rows->n, p->count, p->copy, rows->n, x, p->product);
   for (size_t i = 0; i < p->count; i++) {
     size_t k = p->candidate[i];
     if (-slack_at(rows, k, p->product[i]) * p->weight[i] <= most || p->skip[i] || p->active[k] != QP_FREE) continue;

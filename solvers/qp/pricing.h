@@ -26,7 +26,8 @@ typedef struct qp_pricing {
   size_t *candidate; /* [most] */
   double *copy;      /* [most][n] their rows, dense, scaled, close together in cache */
   double *weight;    /* [most] 1 / |R^-T a_k|: takes violations into the objective's metric */
-  double *work;      /* [most][n] */
+  double *known;     /* [m] the same of every row that was a candidate, else 0 */
+  size_t *fresh;     /* [most] scratch: candidates without */
   double *product;   /* [most] a_k'x */
   double first;      /* distance of the farthest one met in this pass */
   bool *skip;        /* [most] given up until the next pass */
