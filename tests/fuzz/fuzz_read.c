@@ -3,6 +3,7 @@
 #include "fuzz.h"
 
 #include "format.h"
+#include "qp_file.h"
 
 #include <math.h>
 #include <stdint.h>
@@ -52,6 +53,19 @@ static const char *read_mesh(bx_reader *r, bx_format format) {
   const char *wrong = check_mesh(mesh);
   batten_mesh_free(mesh);
   return wrong;
+}
+
+/* Of a problem of 2 unknowns and 1 row, as the corpus has it. */
+static const char *load_qp_solution(bx_reader *r) {
+  double x[2] = {0}, y[3] = {0};
+  signed char active[3] = {0};
+  batten_qp_solution s = {.x = x, .multipliers = y, .active = active};
+  batten_status st = bx_load_qp_solution(r, 2, 1, &s);
+  if (st != BATTEN_OK)
+    return x[0] < 0 || x[0] > 0 || active[2] ? "a result in spite of a failure" : check_failure(r->ctx, st);
+  for (size_t i = 0; i < 3; i++)
+    if (!isfinite(y[i]) || active[i] < -1 || active[i] > 2) return "a solution that is none";
+  return isfinite(x[0]) && isfinite(x[1]) ? NULL : "an x that is not finite";
 }
 
 static const char *load_solid(bx_reader *r) {
@@ -104,7 +118,8 @@ static const char *read_qp(bx_reader *r, bx_format format) {
   if (!wrong) wrong = check_sides(p->lower, p->upper, p->c ? p->c->rows : 0);
   if (!wrong) wrong = check_sides(p->x_lower, p->x_upper, p->n);
   for (size_t j = 0; !wrong && j < p->n; j++)
-    if ((p->g && !isfinite(p->g[j])) || (file.unknown_names && !file.unknown_names[j])) wrong = "g or a name is wrong";
+    if ((p->g && !isfinite(p->g[j])) || (file.unknown_names && !file.unknown_names[j]))
+      wrong = "g or a name is wrong";
   if (!isfinite(p->constant) || !file.name) wrong = "the constant or the name is wrong";
   batten_qp_file_free(r->ctx, &file);
   return wrong;
@@ -119,8 +134,11 @@ static bool read_once(bx_reader *r, bx_format format, unsigned which, const char
     return true;
   }
   if (format == BX_JSON) {
-    if (which > 2) return false;
-    *wrong = which == 0 ? load_solid(r) : which == 1 ? load_carrier(r) : read_qp(r, format);
+    if (which > 3) return false;
+    *wrong = which == 0   ? load_solid(r)
+             : which == 1 ? load_carrier(r)
+             : which == 2 ? read_qp(r, format)
+                          : load_qp_solution(r);
     return true;
   }
   if (which == 3 && format != BX_TEXT)
