@@ -32,7 +32,41 @@ typedef struct qp_trial_result {
 /* Scales below this are those of a problem that is nearly nothing; all data are of size one. */
 #define QP_TRIAL_LEAST 0.01
 
-/* Rounding in x; and that of the data, by which the known solution itself misses to be one. */
+/* Condition of the rows that hold with equality, as Gram and Schmidt find it: 1 over the least part of one of them,
+ * of length 1, that those before it do not make up (rows that they do make up do not count). At a vertex x is given
+ * by these rows alone, whatever the Hessian. */
+static inline double qp_trial_rows_condition(const qp_scene_spec *spec, const qp_scene *s) {
+  const double DEPENDENT = 1e-9;
+  size_t n = spec->n, held = spec->equalities + spec->active, rank = 0;
+  double *q = calloc(n * n + n, sizeof *q), least = 1;
+  long double *row = calloc(n, sizeof *row);
+  for (size_t i = 0; i < held + spec->bounded && rank < n; i++) {
+    long double before = 0, after = 0;
+    memset(row, 0, n * sizeof *row);
+    if (i < held)
+      qp_scene_add(&s->c, i, 1, row);
+    else
+      row[i - held] = 1;
+    for (size_t j = 0; j < n; j++) before += row[j] * row[j];
+    for (size_t k = 0; k < rank; k++) {
+      long double dot = 0;
+      for (size_t j = 0; j < n; j++) dot += q[k * n + j] * row[j];
+      for (size_t j = 0; j < n; j++) row[j] -= dot * q[k * n + j];
+    }
+    for (size_t j = 0; j < n; j++) after += row[j] * row[j];
+    double part = before > 0 ? (double)sqrtl(after / before) : 0;
+    if (part < DEPENDENT) continue;
+    least = fmin(least, part);
+    for (size_t j = 0; j < n; j++) q[rank * n + j] = (double)(row[j] / sqrtl(after));
+    rank++;
+  }
+  free(q);
+  free(row);
+  return 1 / least;
+}
+
+/* Rounding in x, and that of the data, by which the known solution itself misses to be one; but for the condition of
+ * the rows. */
 static inline double qp_trial_allowed(const qp_scene_spec *spec, const qp_verdict *v, const qp_verdict *known) {
   double n = (double)spec->n;
   return spec->condition * (10 * n * 0x1p-52 * (1 + v->dual_scale) + sqrt(n) * known->dual);
@@ -51,6 +85,7 @@ static inline qp_trial_result qp_trial_judge(const qp_scene_spec *spec, const qp
   for (size_t j = 0; j < spec->n; j++) off = fmax(off, fabs(x[j] - s->x[j]));
   qp_verdict known = qp_check(&s->problem, s->x, s->y);
   r.off = off / qp_trial_allowed(spec, &r.verdict, &known);
+  if (r.off > 1) r.off /= qp_trial_rows_condition(spec, s); /* dear, and nearly never needed */
   if (spec->null || (engine == BATTEN_QP_INTERIOR && spec->n > HANDED_OVER)) {
     r.off = fabs(r.verdict.objective - known.objective) / (1e-9 * fmax(known.gap_scale, QP_TRIAL_LEAST));
   }

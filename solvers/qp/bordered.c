@@ -261,7 +261,7 @@ size_t qp_bordered_factor(qp_bordered *f, const double *d, const double *w) {
     assemble(f, d, w, shift);
     if (repaired == 0)
       for (size_t j = 0; j < f->band; j++) top = fmax(top, f->b[j * (f->width + 1)]);
-    if (qp_band_cholesky(f->band, f->width, f->b) == 0 || !isfinite(top) || shift > top) break;
+    if (qp_band_cholesky(f->band, f->width, f->b) == 0 || !isfinite(top) || !(shift < top)) break;
     repaired++; /* rounding has eaten a pivot: all unknowns are held more tightly, refinement takes it out again */
   }
   if (f->border == 0) return repaired;

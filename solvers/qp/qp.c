@@ -97,9 +97,11 @@ static bool within(const batten_qp_info *f, double level) {
 
 static bool at_rounding(const solver *s) { return s->found && within(&s->info, ROUNDING); }
 
-/* Keeps the point under way when it is better than the best so far. Of residuals that are rounding none is better; then
- * the minimiser on a working set goes before the end of a path, which is off by the root of its residuals where
- * multipliers are 0. */
+/* Residuals that are rounding but for a few digits: none of two such points is better for being smaller. */
+static const double ENOUGH = 1e-12;
+
+/* Keeps the point under way when it is better than the best so far. Where both are good enough the minimiser on a
+ * working set goes before the end of a path, which is off by the root of its residuals where multipliers are 0. */
 static void consider(solver *s, batten_qp_engine engine, bool on_working_set) {
   size_t m = s->pre.rows.m;
   if (batten_first_nonfinite(s->n, s->point.x) < s->n) return;
@@ -107,7 +109,8 @@ static void consider(solver *s, batten_qp_engine engine, bool on_working_set) {
   clean(s, &s->point);
   batten_qp_info info = s->info;
   judge(s, &s->point, &info);
-  bool instead = on_working_set && s->info.engine == BATTEN_QP_INTERIOR && within(&info, ROUNDING);
+  bool instead = on_working_set && s->info.engine == BATTEN_QP_INTERIOR && within(&info, ENOUGH) &&
+                 qp_certify_optimal(&info, s->o);
   if (s->found && !instead && !(merit(&info, s->o) < merit(&s->info, s->o))) return;
   s->found = true;
   s->info = info;
@@ -251,7 +254,6 @@ static bool worth_trying(const solver *s, size_t i) {
 /* The best point's working set, solved for outright. *refused: it is not yet the set of a solution. */
 static batten_status polish(solver *s, bool *refused) {
   const size_t SMALL = 100, CHEAP = 300, MOST = 1000; /* unknowns for which it takes some 2 ms, 50 ms, a second */
-  const double ENOUGH = 1e-12;
   double error;
   *refused = false;
   if (!s->found || s->proof < 0 || s->stop < 0 || s->n == 0) return BATTEN_OK;
