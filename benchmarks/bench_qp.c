@@ -2,7 +2,7 @@
  *   1. shape problems of 48 unknowns with 352 to 27,104 rows: engines against each other, setup and solve apart, cold
  * and with a workspace; from A and b and from their Hessian;
  *   2. banded problems of 300 to 10,000 unknowns;
- *   3. warm starts after a 1 % change of the data: pivots and time in parts of those of a cold solve.
+ *   3. warm starts after two kinds of 1 % change of the data: pivots and time in parts of those of a cold solve.
  * All to 1e-9 absolute, residuals beside times; times are medians. Usage: bench-qp [CSV] */
 #include <batten/blas.h>
 #include <batten/qp.h>
@@ -153,19 +153,31 @@ static void banded_problems(bench *b) {
 
 /* ---- Warm starts ---- */
 
-/* Every number of the data by up to 1 % of their largest. */
-static double *changed(const double *data, size_t count, uint64_t seed) {
+typedef qp_scene *(*make_scene)(size_t size, uint64_t seed);
+static qp_scene *make_patch(size_t size, uint64_t seed) { return qp_scene_patch(size, false, seed); }
+static qp_scene *make_curve(size_t size, uint64_t seed) { return qp_scene_curve(size, 0.3, seed); }
+static qp_scene *make_sequence(size_t size, uint64_t seed) { return qp_scene_convex(size, 2, 0.1, seed); }
+
+static const double *data_of(const qp_scene *s) { return s->problem.a ? s->problem.b : s->problem.g; }
+
+/* The data moved by 1 % towards those of other noise; or each number by up to 1 % of the largest. */
+static double *changed(const qp_scene *s, const qp_scene *other) {
+  size_t count = s->problem.a ? s->problem.a->rows : s->problem.n;
   double *out = malloc((count ? count : 1) * sizeof *out), largest = 0;
+  uint64_t seed = 7;
   if (!out) exit(1);
+  const double *data = data_of(s), *to = other ? data_of(other) : NULL;
   for (size_t i = 0; i < count; i++) largest = fmax(largest, fabs(data[i]));
-  for (size_t i = 0; i < count; i++) out[i] = data[i] + 0.01 * largest * (2 * scene_uniform(&seed) - 1);
+  for (size_t i = 0; i < count; i++)
+    out[i] = data[i] + 0.01 * (to ? to[i] - data[i] : largest * (2 * scene_uniform(&seed) - 1));
   return out;
 }
 
-static void warm_row(bench *b, const char *name, qp_scene *s, batten_qp_engine engine) {
+static void warm_row(bench *b, const char *name, make_scene make, size_t size, batten_qp_engine engine, bool noise) {
+  qp_scene *s = make(size, 1), *other = noise ? NULL : make(size, 2);
   batten_qp_problem p = s->problem;
-  size_t m = p.c->rows, k = p.a ? p.a->rows : 0;
-  double *x = malloc(p.n * sizeof *x), *data = p.a ? changed(p.b, k, 7) : changed(p.g, p.n, 7);
+  size_t m = p.c->rows;
+  double *x = malloc(p.n * sizeof *x), *data = changed(s, other);
   signed char *active = malloc(m + p.n);
   if (!x || !active) exit(1);
   batten_qp_options o = options(engine);
@@ -178,32 +190,36 @@ static void warm_row(bench *b, const char *name, qp_scene *s, batten_qp_engine e
   run cold = solve(b, &p, &o, NULL, NULL);
   o.x0 = x, o.active = active;
   run warm = solve(b, &p, &o, NULL, NULL);
+  const char *kind = noise ? "noise" : "1 % of the way";
   if (first.status == BATTEN_OK && cold.status == BATTEN_OK && warm.status == BATTEN_OK)
-    printf("| %s | %s | %zu | %zu | %zu | %zu | %.0f %% | %.3f | %.3f | %.0f %% | %.1e | %.1e | %.1e |\n", name,
-           engine_names[engine], p.n, m, cold.info.iterations, warm.info.iterations,
+    printf("| %s | %s | %s | %zu | %zu | %zu | %zu | %.0f %% | %.3f | %.3f | %.0f %% | %.1e | %.1e | %.1e |\n", name,
+           kind, engine_names[engine], p.n, m, cold.info.iterations, warm.info.iterations,
            100 * (double)warm.info.iterations / (double)(cold.info.iterations ? cold.info.iterations : 1),
            1e3 * cold.seconds, 1e3 * warm.seconds, 100 * warm.seconds / cold.seconds, warm.info.primal_residual,
            warm.info.dual_residual, warm.info.duality_gap);
   else
-    printf("| %s | %s | %zu | %zu | %s, %s, %s | | | | | | | | |\n", name, engine_names[engine], p.n, m,
+    printf("| %s | %s | %s | %zu | %zu | %s, %s, %s | | | | | | | | |\n", name, kind, engine_names[engine], p.n, m,
            batten_status_name(first.status), batten_status_name(cold.status), batten_status_name(warm.status));
   fflush(stdout);
   free(active);
   free(data);
   free(x);
+  qp_scene_free(other);
   qp_scene_free(s);
 }
 
 static void warm_starts(bench *b) {
   printf(
-      "\n## Warm starts: the data changed by 1 %% of their largest\n\n| problem | engine | n | m | pivots cold | "
-      "warm | part |"
-      " ms cold | warm | part | primal | dual | gap |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
-  for (batten_qp_engine engine = BATTEN_QP_PRIMAL; engine <= BATTEN_QP_DUAL; engine++) {
-    for (size_t size = 0; size < 4; size++) warm_row(b, "patch", qp_scene_patch(size, false, 1), engine);
-    warm_row(b, "curve", qp_scene_curve(100, 0.3, 1), engine);
-    warm_row(b, "convex sequence", qp_scene_convex(200, 2, 0.1, 1), engine);
-  }
+      "\n## Warm starts\n\nThe data moved by 1 %% towards those of other noise, or noise of 1 %% of the largest "
+      "added.\n\n| problem |"
+      " change | engine | n | m | pivots cold | warm | part | ms cold | warm | part | primal | dual | gap |\n"
+      "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
+  for (int noise = 0; noise < 2; noise++)
+    for (batten_qp_engine engine = BATTEN_QP_PRIMAL; engine <= BATTEN_QP_DUAL; engine++) {
+      for (size_t size = 0; size < 4; size++) warm_row(b, "patch", make_patch, size, engine, noise);
+      warm_row(b, "curve", make_curve, 100, engine, noise);
+      warm_row(b, "convex sequence", make_sequence, 200, engine, noise);
+    }
 }
 
 int main(int argc, char **argv) {
