@@ -129,7 +129,7 @@ def run_problem(p, solvers, eps, limit, budget):
         if note:
             text = f"no ({note})"
         rows.append(dict(problem=p.name, family=p.family, n=p.n, m=p.m, solver=solver.label, seconds=seconds,
-                         claimed=int(claim), solved=int(solved), primal=primal, dual=dual, gap=gap))
+                         claimed=int(claim), solved=int(solved), primal=primal, dual=dual, gap=gap, note=note))
         print(f"| {solver.label} | {figure(seconds)} | {text} | {primal:.1e} | {dual:.1e} | {gap:.1e} |", flush=True)
     return rows
 
@@ -190,7 +190,7 @@ def main():
             writer.writeheader()
             writer.writerows(rows)
     if o.picture:
-        qp_picture.write(o.picture, [r for r in rows if r["family"] == "patch"])
+        qp_picture.write(o.picture, [r for r in rows if r["family"] == "patch" and not r["solver"].startswith("batten ")])
 
 
 main()

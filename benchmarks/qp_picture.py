@@ -1,8 +1,8 @@
 """A picture of time against rows, one line a solver, both axes logarithmic; SVG written directly, no package needed."""
 import math
 
-WIDTH, HEIGHT = 760, 520
-LEFT, RIGHT, TOP, BOTTOM = 74, 190, 62, 58
+WIDTH, HEIGHT = 780, 520
+LEFT, RIGHT, TOP, BOTTOM = 74, 205, 62, 58
 OURS = "#c0392b"
 COLORS = ["#1f618d", "#117a65", "#7d3c98", "#b7950b", "#34495e", "#2e86c1", "#a04000", "#229954", "#85929e", "#6c3483"]
 TEXT = 'font-family="Helvetica, Arial, sans-serif"'
@@ -25,8 +25,8 @@ def _spread(wanted, gap):
 
 
 def write(path, rows):
-    """rows: dicts with solver, m, seconds, solved. What is not solved is drawn hollow."""
-    lines = {}
+    """rows: dicts with solver, m, seconds, solved, note. What is not solved is drawn hollow; what was ended says so."""
+    lines, ended = {}, {r["solver"] for r in rows if r["m"] == max(q["m"] for q in rows) and r["note"] == "time"}
     for r in rows:
         lines.setdefault(r["solver"], []).append((r["m"], r["seconds"], r["solved"]))
     if not lines:
@@ -47,7 +47,7 @@ def write(path, rows):
            f'<text x="{LEFT}" y="26" {TEXT} font-size="16" fill="#222">Convex surface patches: 48 unknowns, time against '
            f'rows</text>',
            f'<text x="{LEFT}" y="45" {TEXT} font-size="12" fill="#666">one thread, cold solve, residuals and gap to 1e-9; '
-           f'hollow: misses that</text>']
+           f'hollow: misses that, or was ended</text>']
     for power in range(math.ceil(y_low), math.floor(y_high) + 1):
         at = y(10.0 ** power)
         out.append(f'<line x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{at:.1f}" y2="{at:.1f}" stroke="#ddd"/>')
@@ -75,7 +75,7 @@ def write(path, rows):
         out.append(f'<line x1="{x(end[0]) + 5:.1f}" y1="{y(end[1]):.1f}" x2="{WIDTH - RIGHT + 22}" y2="{height:.1f}" '
                    f'stroke="{color}" stroke-width="0.6"/>')
         out.append(f'<text x="{WIDTH - RIGHT + 26}" y="{height + 4:.1f}" {TEXT} font-size="12.5" fill="{color}"'
-                   f'{" font-weight=%sbold%s" % (chr(34), chr(34)) if ours else ""}>{label} · {_time(end[1])}</text>')
+                   f'{" font-weight=%sbold%s" % (chr(34), chr(34)) if ours else ""}>{label} · {'over ' * (label in ended)}{_time(end[1])}</text>')
     out.append("</svg>")
     with open(path, "w", encoding="utf-8") as f:
         f.write("\n".join(out) + "\n")
