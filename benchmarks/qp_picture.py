@@ -74,8 +74,10 @@ def write(path, rows):
         end = line[-1]
         out.append(f'<line x1="{x(end[0]) + 5:.1f}" y1="{y(end[1]):.1f}" x2="{WIDTH - RIGHT + 22}" y2="{height:.1f}" '
                    f'stroke="{color}" stroke-width="0.6"/>')
-        out.append(f'<text x="{WIDTH - RIGHT + 26}" y="{height + 4:.1f}" {TEXT} font-size="12.5" fill="{color}"'
-                   f'{" font-weight=%sbold%s" % (chr(34), chr(34)) if ours else ""}>{label} · {'over ' * (label in ended)}{_time(end[1])}</text>')
+        weight = ' font-weight="bold"' if ours else ""
+        time = ("over " if label in ended else "") + _time(end[1])
+        out.append(f'<text x="{WIDTH - RIGHT + 26}" y="{height + 4:.1f}" {TEXT} font-size="12.5" fill="{color}"{weight}>'
+                   f'{label} · {time}</text>')
     out.append("</svg>")
     with open(path, "w", encoding="utf-8") as f:
         f.write("\n".join(out) + "\n")
