@@ -37,10 +37,20 @@ static double norm(size_t n, const double *a) {
 
 /* ---- Life ---- */
 
+/* Column j of R^-1 is (e_j - R^-1 r_j) / r_jj with the columns before it [LAPACK's trtri]. */
 static void invert(size_t n, const double *r, double *inverse) {
+  const size_t WORTH_BLAS = 192;
   memset(inverse, 0, n * n * sizeof *inverse);
-  for (size_t j = 0; j < n; j++) inverse[j + j * n] = 1;
-  batten_la_trsm(BATTEN_LA_DOUBLE, 'L', 'U', 'N', n, n, 1, r, n, inverse, n);
+  if (n >= WORTH_BLAS) {
+    for (size_t j = 0; j < n; j++) inverse[j + j * n] = 1;
+    batten_la_trsm(BATTEN_LA_DOUBLE, 'L', 'U', 'N', n, n, 1, r, n, inverse, n);
+    return;
+  }
+  for (size_t j = 0; j < n; j++) {
+    double unit = 1 / r[j + j * n];
+    qp_lanes_now()->combine(j, j, inverse, n, -unit, r + j * n, inverse + j * n);
+    inverse[j + j * n] = unit;
+  }
 }
 
 batten_status qp_active_new(batten_context *ctx, const qp_dense *objective, const qp_rows *rows, qp_active *set) {

@@ -403,12 +403,7 @@ qp_cost qp_dual_cost(const qp_rows *rows) {
   /* R^-1; passes over all entries; pivots, of which there are about n / 2 where rows are many, with their candidates.
    */
   const double PASSES = 6;
-  double unknowns = (double)n, entries = 0;
-  for (size_t k = 0; k < rows->m; k++) {
-    const double *values;
-    const uint32_t *columns;
-    entries += (double)qp_rows_entries(rows, k, &values, &columns);
-  }
+  double unknowns = (double)n, entries = (double)qp_rows_count(rows);
   double pivots = fmin(unknowns, (double)rows->m) / 2 + 8;
   return (qp_cost){bytes, unknowns * unknowns * unknowns + PASSES * 2 * entries + pivots * 10 * unknowns * unknowns};
 }

@@ -39,6 +39,9 @@ void qp_rows_times(const qp_rows *rows, size_t first, size_t count, const double
  * gives one entry with value 1. */
 size_t qp_rows_entries(const qp_rows *rows, size_t k, const double **values, const uint32_t **columns);
 
+/* Entries of all constraints. */
+size_t qp_rows_count(const qp_rows *rows);
+
 static inline bool qp_rows_is_equality(const qp_rows *rows, size_t k) { return rows->lower[k] == rows->upper[k]; }
 
 /* Side of a constraint in a working set; as in batten_qp_solution.active. */

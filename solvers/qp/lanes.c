@@ -2,6 +2,8 @@
  * vector instructions. */
 #include "lanes.h"
 
+#include <math.h>
+
 #define JOIN_(a, b) a##b
 #define JOIN(a, b) JOIN_(a, b)
 
@@ -25,21 +27,29 @@ static double dot(size_t n, const double *restrict a, const double *restrict x) 
 }
 
 /* Four columns for each time that x is loaded. */
+static inline void four_dots(size_t n, const double *const a[4], const double *restrict x, double *restrict out) {
+  enum { SIDE = 4 };
+  double s[SIDE][LANES] = {{0}};
+  size_t i = 0;
+  for (; i + LANES <= n; i += LANES)
+    for (size_t q = 0; q < SIDE; q++) LANES_LOOP(size_t l = 0; l < LANES; l++) s[q][l] += a[q][i + l] * x[i + l];
+  for (; i < n; i++)
+    for (size_t q = 0; q < SIDE; q++) s[q][i % LANES] += a[q][i] * x[i];
+  for (size_t q = 0; q < SIDE; q++) out[q] = sum_of(s[q]);
+}
+
 static void dots(size_t n, size_t count, const double *restrict a, size_t ld, const double *restrict x,
                  double *restrict out) {
-  enum { SIDE = 4 };
   size_t j = 0;
-  for (; j + SIDE <= count; j += SIDE, a += SIDE * ld) {
-    double s[SIDE][LANES] = {{0}};
-    size_t i = 0;
-    for (; i + LANES <= n; i += LANES)
-      for (size_t q = 0; q < SIDE; q++)
-        LANES_LOOP(size_t l = 0; l < LANES; l++) s[q][l] += a[q * ld + i + l] * x[i + l];
-    for (; i < n; i++)
-      for (size_t q = 0; q < SIDE; q++) s[q][i % LANES] += a[q * ld + i] * x[i];
-    for (size_t q = 0; q < SIDE; q++) out[j + q] = sum_of(s[q]);
-  }
+  for (; j + 4 <= count; j += 4, a += 4 * ld)
+    four_dots(n, (const double *const[4]){a, a + ld, a + 2 * ld, a + 3 * ld}, x, out + j);
   for (; j < count; j++, a += ld) out[j] = dot(n, a, x);
+}
+
+static void dots_at(size_t n, size_t count, const double *const *a, const double *restrict x, double *restrict out) {
+  size_t j = 0;
+  for (; j + 4 <= count; j += 4) four_dots(n, a + j, x, out + j);
+  for (; j < count; j++) out[j] = dot(n, a[j], x);
 }
 
 /* Four columns for each time that x is loaded and stored. */
@@ -73,6 +83,14 @@ static void rotate(size_t n, double c, double s, double *restrict a, double *res
   }
 }
 
+static void slacks(size_t count, const double *restrict lower, const double *restrict upper,
+                   double *restrict products) {
+  for (size_t k = 0; k < count; k++) {
+    double above = products[k] - lower[k], below = upper[k] - products[k], least = above < below ? above : below;
+    products[k] = lower[k] < upper[k] ? least : INFINITY;
+  }
+}
+
 static void squares(size_t n, const double *restrict a, const double *restrict x, double *square, double *along) {
   double s[LANES] = {0}, t[LANES] = {0};
   size_t i = 0;
@@ -88,4 +106,4 @@ static void squares(size_t n, const double *restrict a, const double *restrict x
 }
 
 extern const qp_lanes JOIN(qp_lanes_, QP_ISA);
-const qp_lanes JOIN(qp_lanes_, QP_ISA) = {dots, combine, subtract, rotate, squares};
+const qp_lanes JOIN(qp_lanes_, QP_ISA) = {dots, dots_at, combine, subtract, rotate, slacks, squares};

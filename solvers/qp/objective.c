@@ -338,15 +338,20 @@ done:
  * that of R is the root of H's, so beyond eps^-1/2 nothing of the smallest eigenvalues is known. */
 static batten_status factor_hessian(batten_context *ctx, const qp_objective *o, double rho, double *r) {
   size_t n = o->n;
-  double rcond = 0;
+  double rcond = 0, *inverse = batten_alloc_array(ctx, n, sizeof *inverse);
+  if (!inverse) return BATTEN_E_NOMEM;
+  for (size_t j = 0; j < n; j++) inverse[j] = 1 / o->metric[j]; /* powers of two */
   memset(r, 0, n * n * sizeof *r);
   for (size_t i = 0; o->problem->h && i < n; i++) {
     qp_matrix_row row = qp_row_of(o->problem->h, i);
+    double unit = 0.5 * inverse[i];
     for (size_t e = 0; e < row.count; e++) {
       size_t j = qp_row_column(&row, e), low = i < j ? i : j, high = i < j ? j : i;
-      r[low + high * n] += (i == j ? 1 : 0.5) * (row.values[e] / o->metric[i] / o->metric[j]);
+      r[low + high * n] += row.values[e] * unit * inverse[j];
     }
+    r[i + i * n] *= 2; /* was met once */
   }
+  batten_free(ctx, inverse);
   for (size_t j = 0; j < n; j++) r[j + j * n] += rho;
   if (!batten_la_fits(n)) return batten_fail(ctx, BATTEN_E_TOO_LARGE, "n: %zu unknowns; use the interior engine", n);
   bool lost = batten_la_potrf(D, 'U', n, r, n) != 0;

@@ -90,14 +90,21 @@ static direction direction_of(const qp_matrix_row *row, const double *random) {
   }
   double length = sqrt(square);
   d.component = along / length;
-  d.scale = fmin(unit / length, DBL_MAX);
+  d.scale = unit / length;
+  if (!(d.scale < DBL_MAX)) d.scale = DBL_MAX;
   return d;
 }
 
 /* A side in the units of the unit row: what overflows on the far side is none, on the near side the largest number.
  */
-static double scaled_lower(double side, double scale) { return fmin(side * scale, DBL_MAX); }
-static double scaled_upper(double side, double scale) { return fmax(side * scale, -DBL_MAX); }
+static double scaled_lower(double side, double scale) {
+  double scaled = side * scale;
+  return scaled < DBL_MAX ? scaled : DBL_MAX;
+}
+static double scaled_upper(double side, double scale) {
+  double scaled = side * scale;
+  return scaled > -DBL_MAX ? scaled : -DBL_MAX;
+}
 
 static double lower_of(const batten_qp_problem *p, size_t i) { return p->lower ? p->lower[i] : -INFINITY; }
 static double upper_of(const batten_qp_problem *p, size_t i) { return p->upper ? p->upper[i] : INFINITY; }
@@ -337,6 +344,7 @@ static batten_status drop_implied(presolver *s) {
     if (st < 0) return st;
     if (o->lower[k] == -INFINITY && o->upper[k] == INFINITY) continue;
     size_t to = left++;
+    if (to == k) continue;
     o->row[to] = o->row[k], o->scale[to] = o->scale[k];
     o->lower[to] = o->lower[k], o->upper[to] = o->upper[k];
     o->lower_from[to] = o->lower_from[k], o->upper_from[to] = o->upper_from[k];

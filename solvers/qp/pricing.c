@@ -62,8 +62,9 @@ batten_status qp_pricing_new(batten_context *ctx, const qp_rows *rows, const sig
   if (!p->last) return BATTEN_E_NOMEM;
   p->offer = batten_alloc_array(ctx, p->chunks + 2 * most, sizeof *p->offer);
   if (!p->offer) return BATTEN_E_NOMEM;
-  p->skip = batten_alloc_array(ctx, most, sizeof *p->skip);
-  if (!p->skip) return BATTEN_E_NOMEM;
+  p->values = batten_alloc_array(ctx, most, sizeof *p->values + sizeof *p->skip);
+  if (!p->values) return BATTEN_E_NOMEM;
+  p->skip = (bool *)(p->values + most);
   p->safe_till = p->last + n;
   p->known = p->safe_till + m;
   p->offer_by = p->known + m;
@@ -79,7 +80,7 @@ batten_status qp_pricing_new(batten_context *ctx, const qp_rows *rows, const sig
 }
 
 void qp_pricing_free(batten_context *ctx, qp_pricing *p) {
-  batten_free(ctx, p->skip);
+  batten_free(ctx, p->values);
   batten_free(ctx, p->offer);
   batten_free(ctx, p->last);
   *p = (qp_pricing){0};
@@ -88,7 +89,7 @@ void qp_pricing_free(batten_context *ctx, qp_pricing *p) {
 size_t qp_pricing_bytes(const qp_rows *rows) {
   size_t chunks = rows->m / chunk_rows(rows) + 1, all;
   count_doubles(rows, chunks, &all);
-  batten_add(all, chunks + 3 * candidates_most(rows), &all);
+  batten_add(all, chunks + 5 * candidates_most(rows), &all);
   batten_mul(all, sizeof(double), &all);
   return all;
 }
@@ -131,21 +132,20 @@ typedef struct pass {
   const double *x;
 } pass;
 
-/* Rows first .. first + count - 1 of one chunk make its offer. known: their products are in till. */
+/* Rows first .. first + count - 1 of one chunk make its offer. known: their slacks are in till, INFINITY for those
+ * that are not priced. */
 static void price_chunk(const pass *job, size_t chunk, size_t first, size_t count, bool known) {
   qp_pricing *p = job->p;
   const qp_rows *rows = p->rows;
-  double keep = p->path * (1 - 4 * DBL_EPSILON), most = 0;
+  double keep = p->path * (1 - 4 * DBL_EPSILON), most = 0, *till = p->safe_till;
   size_t offer = SIZE_MAX;
   for (size_t k = first; k < first + count; k++) {
-    double *till = &p->safe_till[k];
-    if (qp_rows_is_equality(rows, k)) *till = INFINITY;
-    if (*till == INFINITY || (!known && *till > p->path)) continue;
-    double product = known ? *till : qp_rows_dot(rows, k, job->x), slack = slack_at(rows, k, product);
+    if (!known && !(till[k] <= p->path)) continue;
+    double slack = known ? till[k] : slack_at(rows, k, qp_rows_dot(rows, k, job->x));
     signed char side;
-    *till = slack + keep;
+    till[k] = slack + keep;
     if (!(-slack > most) || p->active[k] != QP_FREE) continue;
-    double violation = qp_pricing_violation(p, k, product, job->x, &side);
+    double violation = qp_pricing_violation(p, k, qp_rows_dot(rows, k, job->x), job->x, &side);
     if (violation <= most) continue;
     offer = k;
     most = violation;
@@ -164,7 +164,10 @@ static void price_block(void *arg, size_t index) {
   for (size_t i = 0; i < count; i++) due += till[i] > p->path ? 0 : 1;
   /* A product in a run of rows costs a third of one by itself. */
   bool all = due > count / 3;
-  if (all) qp_rows_times(rows, first, count, job->x, till);
+  if (all) {
+    qp_rows_times(rows, first, count, job->x, till);
+    qp_lanes_now()->slacks(count, rows->lower + first, rows->upper + first, till);
+  }
   for (size_t chunk = index * p->per_block, done = 0; done < count; chunk++, done += p->chunk) {
     p->offer[chunk] = SIZE_MAX;
     p->offer_by[chunk] = 0;
@@ -196,17 +199,17 @@ static void select_largest(size_t *rows, double *by, size_t count, size_t most) 
   }
 }
 
-static void copy_row(const qp_rows *rows, size_t k, double *to) {
+/* The candidate's row where it is, or spread out where it is sparse. */
+static void take_row(qp_pricing *p, size_t place) {
   const double *values;
   const uint32_t *columns;
-  size_t count = qp_rows_entries(rows, k, &values, &columns);
-  double scale = rows->scale[k];
-  if (columns) {
-    memset(to, 0, rows->n * sizeof *to);
-    for (size_t e = 0; e < count; e++) to[columns[e]] = scale * values[e];
-  } else {
-    for (size_t j = 0; j < count; j++) to[j] = scale * values[j];
-  }
+  size_t n = p->rows->n, count = qp_rows_entries(p->rows, p->candidate[place], &values, &columns);
+  p->values[place] = values;
+  if (!columns) return;
+  double *to = p->copy + place * n;
+  memset(to, 0, n * sizeof *to);
+  for (size_t e = 0; e < count; e++) to[columns[e]] = values[e];
+  p->values[place] = to;
 }
 
 /* Weights of candidates, which are kept: many come back pass after pass. R^-T a_k by blocks of columns of R^-1, which
@@ -225,19 +228,20 @@ static void weigh(qp_pricing *p) {
     size_t columns = n - j < COLUMNS ? n - j : COLUMNS;
     for (size_t f = 0; f < fresh; f++) {
       double part[COLUMNS];
-      qp_lanes_now()->dots(j + columns, columns, p->inverse + j * n, n, p->copy + p->fresh[f] * n, part);
+      qp_lanes_now()->dots(j + columns, columns, p->inverse + j * n, n, p->values[p->fresh[f]], part);
       for (size_t c = 0; c < columns; c++) square[f] += part[c] * part[c];
     }
   }
   for (size_t f = 0; f < fresh; f++) {
     size_t i = p->fresh[f];
-    p->weight[i] = p->known[p->candidate[i]] = 1 / sqrt(square[f]);
+    size_t k = p->candidate[i];
+    p->weight[i] = p->known[k] = 1 / (p->rows->scale[k] * sqrt(square[f]));
   }
 }
 
 static void gather(qp_pricing *p) {
   const qp_rows *rows = p->rows;
-  size_t n = rows->n, most = candidates_most(rows), count = 0;
+  size_t most = candidates_most(rows), count = 0;
   for (size_t i = 0; i < p->chunks; i++) {
     if (p->offer[i] == SIZE_MAX) continue;
     p->offer[count] = p->offer[i];
@@ -252,7 +256,7 @@ static void gather(qp_pricing *p) {
   for (size_t i = 0; i < count; i++) {
     p->candidate[i] = p->offer[i];
     p->skip[i] = false;
-    copy_row(rows, p->candidate[i], p->copy + i * n);
+    take_row(p, i);
   }
   weigh(p);
 }
@@ -287,9 +291,10 @@ size_t qp_pricing_worst(qp_pricing *p, const double *x) {
   double most = 0;
   signed char side;
   p->length = length(rows->n, x);
-  qp_lanes_now()->dots(rows->n, p->count, p->copy, rows->n, x, p->product);
+  qp_lanes_now()->dots_at(rows->n, p->count, p->values, x, p->product);
   for (size_t i = 0; i < p->count; i++) {
     size_t k = p->candidate[i];
+    p->product[i] *= rows->scale[k];
     if (-slack_at(rows, k, p->product[i]) * p->weight[i] <= most || p->skip[i] || p->active[k] != QP_FREE) continue;
     double violation = qp_pricing_violation(p, k, p->product[i], x, &side) * p->weight[i];
     if (violation > most) {

@@ -22,15 +22,16 @@ typedef struct qp_pricing {
   size_t *offer;        /* [chunks] most violated row of each chunk, SIZE_MAX = none */
   double *offer_by;     /* by how much */
 
-  size_t count;      /* of candidates now */
-  size_t *candidate; /* [most] */
-  double *copy;      /* [most][n] their rows, dense, scaled, close together in cache */
-  double *weight;    /* [most] 1 / |R^-T a_k|: takes violations into the objective's metric */
-  double *known;     /* [m] the same of every row that was a candidate, else 0 */
-  size_t *fresh;     /* [most] scratch: candidates without */
-  double *product;   /* [most] a_k'x */
-  double first;      /* distance of the farthest one met in this pass */
-  bool *skip;        /* [most] given up until the next pass */
+  size_t count;          /* of candidates now */
+  size_t *candidate;     /* [most] */
+  const double **values; /* [most] their rows, dense, not scaled: the caller's or in copy */
+  double *copy;          /* [most][n] of sparse ones */
+  double *weight;        /* [most] 1 / |R^-T a_k|: takes violations into the objective's metric */
+  double *known;         /* [m] the same of every row that was a candidate, else 0 */
+  size_t *fresh;         /* [most] scratch: candidates without */
+  double *product;       /* [most] a_k'x */
+  double first;          /* distance of the farthest one met in this pass */
+  bool *skip;            /* [most] given up until the next pass */
 } qp_pricing;
 
 /* Free with qp_pricing_free, also after NOMEM. */

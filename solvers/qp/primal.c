@@ -401,11 +401,8 @@ done:
 
 qp_cost qp_primal_cost(const qp_rows *rows) {
   size_t n = rows->n, m = rows->m, longest = m > n ? m : n, at_once = n, part, bytes = 0;
-  double entries = 0;
+  double entries = (double)qp_rows_count(rows);
   for (size_t k = 0, equalities = 0; k < m; k++) {
-    const double *values;
-    const uint32_t *columns;
-    entries += (double)qp_rows_entries(rows, k, &values, &columns);
     equalities += qp_rows_is_equality(rows, k);
     at_once = equalities > at_once ? equalities : at_once;
   }

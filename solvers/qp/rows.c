@@ -23,6 +23,18 @@ size_t qp_rows_entries(const qp_rows *rows, size_t k, const double **values, con
   return c->starts[row + 1] - c->starts[row];
 }
 
+size_t qp_rows_count(const qp_rows *rows) {
+  const double *values;
+  const uint32_t *columns;
+  size_t count = 0, k = rows->m;
+  if (rows->c && rows->c->dense) { /* bounds come last */
+    while (k > 0 && rows->row[k - 1] >= rows->c->rows) k--;
+    return k * rows->c->columns + (rows->m - k);
+  }
+  while (k > 0) count += qp_rows_entries(rows, --k, &values, &columns);
+  return count;
+}
+
 double qp_rows_dot(const qp_rows *rows, size_t k, const double *x) {
   const double *values;
   const uint32_t *columns;

@@ -29,6 +29,10 @@ static size_t results(const qp_lanes *lanes, const qp_judge_sums *sums, size_t n
   size_t used = 0;
   lanes->dots(n, count, a, LD, x, out);
   used += count;
+  const double *at[COLUMNS];
+  for (size_t j = 0; j < count; j++) at[j] = a + (count - 1 - j) * LD;
+  lanes->dots_at(n, count, at, x, out + used);
+  used += count;
   memcpy(out + used, x, n * sizeof *x);
   lanes->combine(n, count, a, LD, 0.75, u, out + used);
   used += n;
@@ -36,6 +40,9 @@ static size_t results(const qp_lanes *lanes, const qp_judge_sums *sums, size_t n
   lanes->subtract(n, count, b, LD, x, u);
   lanes->rotate(n, 0.6, 0.8, b, b + LD);
   for (size_t j = 0; j < count; j++, used += n) memcpy(out + used, b + j * LD, n * sizeof *b);
+  memcpy(out + used, x, n * sizeof *x);
+  lanes->slacks(n, a, a + 1, out + used);
+  used += n;
   lanes->squares(n, a, x, out + used, out + used + 1);
   out[used + 2] = sums->plain(n, a, columns, x, out + used + 3);
   sums->twice(n, a, columns, x, out + used + 4, out + used + 5);
@@ -69,13 +76,18 @@ static void test_same_bits(void) {
 
 static void test_values(void) {
   double worst = 0, worst_twice = 0;
-  size_t beyond = 0;
+  size_t beyond = 0, elsewhere = 0;
   fill(2);
   for (unsigned set = 0; qp_lanes_at(set); set++)
     for (size_t n = 1; n <= MOST; n++) {
       double out[COLUMNS], sum[LD], square, along, size, hi, lo;
       qp_lanes_at(set)->dots(n, COLUMNS, a, LD, x, out);
       for (size_t j = 0; j < COLUMNS; j++) worst = fmax(worst, fabs((double)(out[j] - dot(n, a + j * LD, x))));
+      const double *at[COLUMNS];
+      double again[COLUMNS];
+      for (size_t j = 0; j < COLUMNS; j++) at[j] = a + j * LD;
+      qp_lanes_at(set)->dots_at(n, COLUMNS, at, x, again);
+      elsewhere += memcmp(out, again, sizeof out) != 0;
       memset(sum, 0, sizeof sum);
       qp_lanes_at(set)->combine(n, COLUMNS, a, LD, 2, u, sum);
       for (size_t i = 0; i < n; i++) {
@@ -94,6 +106,7 @@ static void test_values(void) {
       qp_judge_sums_at(set)->twice(n, a, NULL, x, &hi, &lo);
       worst_twice = fmax(worst_twice, fabs((double)(hi + (long double)lo - dot(n, a, x))));
     }
+  T_CHECK(elsewhere == 0, "vectors here and there: the same");
   T_CHECK(beyond == 0, "nothing is written beyond the end");
   T_CHECK(worst < 40 * DBL_EPSILON, "errors of plain sums %.2g", worst);
   T_CHECK(worst_twice < 100 * LDBL_EPSILON, "of sums in twice the precision %.2g", worst_twice);
