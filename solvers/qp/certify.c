@@ -88,11 +88,6 @@ static void add_row(const batten_matrix *m, size_t i, exact factor, double *hi, 
   if (l.count > 0) qp_judge_sums_now()->add(l.count, l.values, l.columns, factor.hi, factor.lo, hi, lo);
 }
 
-static void add_plain(const batten_matrix *m, size_t i, double factor, double *to) {
-  line l = line_of(m, i);
-  for (size_t e = 0; e < l.count; e++) to[column_of(&l, e)] += factor * l.values[e];
-}
-
 static double weight(const batten_qp_problem *p, size_t i) { return p->weights ? p->weights[i] : 1; }
 static double target(const batten_qp_problem *p, size_t i) { return p->b ? p->b[i] : 0; }
 
@@ -142,18 +137,22 @@ static void judge_primal(const batten_qp_problem *p, const double *x, batten_qp_
   }
 }
 
-/* to [n] := A'WA x + H x, plainly: for its size. */
-static void plain_curvature(const batten_qp_problem *p, const double *x, double *to) {
+/* curvature [n] := A'WA x + H x, linear [n] := g - A'W b, plainly: for their sizes. */
+static void plain_parts(const batten_qp_problem *p, const double *x, double *curvature, double *linear) {
   double size;
-  memset(to, 0, p->n * sizeof *to);
-  for (size_t i = 0; i < rows_of(p->a); i++) add_plain(p->a, i, weight(p, i) * plain_dot(p->a, i, x, &size), to);
-  for (size_t j = 0; j < rows_of(p->h); j++) to[j] += plain_dot(p->h, j, x, &size);
-}
-
-/* to [n] := g - A'W b, plainly. */
-static void plain_linear(const batten_qp_problem *p, double *to) {
-  for (size_t j = 0; j < p->n; j++) to[j] = p->g ? p->g[j] : 0;
-  for (size_t i = 0; p->b && i < rows_of(p->a); i++) add_plain(p->a, i, -weight(p, i) * p->b[i], to);
+  for (size_t j = 0; j < p->n; j++) {
+    curvature[j] = p->h ? plain_dot(p->h, j, x, &size) : 0;
+    linear[j] = p->g ? p->g[j] : 0;
+  }
+  for (size_t i = 0; i < rows_of(p->a); i++) {
+    line l = line_of(p->a, i);
+    double w = weight(p, i), along = w * plain_dot(p->a, i, x, &size), from = w * target(p, i);
+    for (size_t e = 0; e < l.count; e++) {
+      size_t j = column_of(&l, e);
+      curvature[j] += along * l.values[e];
+      linear[j] -= from * l.values[e];
+    }
+  }
 }
 
 /* (hi, lo) [n] := gradient at x. Returns the objective. */
@@ -220,12 +219,12 @@ void qp_certify_residuals(const batten_qp_problem *problem, const double *x, con
   exact sides = {0, 0}, gap = {0, 0};
   judge_primal(p, x, info);
 
-  plain_curvature(p, x, hi);
-  for (size_t j = 0; j < n; j++) energy += hi[j] * x[j];
-  info->dual_scale = largest(n, hi);
-  plain_linear(p, hi);
-  for (size_t j = 0; j < n; j++) linear += hi[j] * x[j];
-  info->dual_scale = larger(largest(n, hi), info->dual_scale);
+  plain_parts(p, x, hi, lo);
+  for (size_t j = 0; j < n; j++) {
+    energy += hi[j] * x[j];
+    linear += lo[j] * x[j];
+  }
+  info->dual_scale = larger(largest(n, hi), largest(n, lo));
   if (y) {
     memset(work, 0, 2 * n * sizeof *work);
     add_multipliers(p, 1, y, hi, lo);

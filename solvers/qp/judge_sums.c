@@ -17,22 +17,37 @@ enum { LANES = 8 };
 
 static double sum_of(const double *s) { return ((s[0] + s[4]) + (s[2] + s[6])) + ((s[1] + s[5]) + (s[3] + s[7])); }
 
-static double plain(size_t n, const double *restrict a, const uint32_t *restrict columns, const double *restrict x,
-                    double *size) {
-  double s[LANES] = {0}, t[LANES] = {0};
+/* x at the next LANES entries: where it is, or gathered. */
+static inline const double *take(const double *x, const uint32_t *columns, size_t i, double *gathered) {
+  if (!columns) return x + i;
+  for (size_t l = 0; l < LANES; l++) gathered[l] = x[columns[i + l]];
+  return gathered;
+}
+
+static inline double plain_of(size_t n, const double *restrict a, const uint32_t *restrict columns,
+                              const double *restrict x, double *size) {
+  double s[LANES] = {0}, t[LANES] = {0}, gathered[LANES];
   size_t i = 0;
-  for (; !columns && i + LANES <= n; i += LANES) LANES_LOOP(size_t l = 0; l < LANES; l++) {
-      double product = a[i + l] * x[i + l];
+  for (; i + LANES <= n; i += LANES) {
+    const double *v = take(x, columns, i, gathered);
+    LANES_LOOP(size_t l = 0; l < LANES; l++) {
+      double product = a[i + l] * v[l];
       s[l] += product;
       t[l] += fabs(product);
     }
-  for (; i < n; i++) {
-    double product = a[i] * x[columns ? columns[i] : i];
-    s[i % LANES] += product;
-    t[i % LANES] += fabs(product);
+  }
+  for (size_t l = 0; i + l < n; l++) {
+    double product = a[i + l] * x[columns ? columns[i + l] : i + l];
+    s[l] += product;
+    t[l] += fabs(product);
   }
   *size = sum_of(t);
   return sum_of(s);
+}
+
+/* Twice, so that the loop over dense rows is one of its own. */
+static double plain(size_t n, const double *a, const uint32_t *columns, const double *x, double *size) {
+  return columns ? plain_of(n, a, columns, x, size) : plain_of(n, a, NULL, x, size);
 }
 
 /* hi + lo += v, Knuth's TwoSum. */
@@ -48,29 +63,49 @@ static inline void plus_product(double *hi, double *lo, double a, double b) {
   *lo += fma(a, b, -product);
 }
 
-static void twice(size_t n, const double *restrict a, const uint32_t *restrict columns, const double *restrict x,
-                  double *hi, double *lo) {
-  double s[LANES] = {0}, t[LANES] = {0};
+static inline void twice_of(size_t n, const double *restrict a, const uint32_t *restrict columns,
+                            const double *restrict x, double *hi, double *lo) {
+  double s[LANES] = {0}, t[LANES] = {0}, gathered[LANES];
   size_t i = 0;
-  for (; !columns && i + LANES <= n; i += LANES)
-    LANES_LOOP(size_t l = 0; l < LANES; l++) plus_product(&s[l], &t[l], a[i + l], x[i + l]);
-  for (; i < n; i++) plus_product(&s[i % LANES], &t[i % LANES], a[i], x[columns ? columns[i] : i]);
+  for (; i + LANES <= n; i += LANES) {
+    const double *v = take(x, columns, i, gathered);
+    LANES_LOOP(size_t l = 0; l < LANES; l++) plus_product(&s[l], &t[l], a[i + l], v[l]);
+  }
+  for (size_t l = 0; i + l < n; l++) plus_product(&s[l], &t[l], a[i + l], x[columns ? columns[i + l] : i + l]);
   double high = s[0], low = sum_of(t);
   for (size_t l = 1; l < LANES; l++) plus(&high, &low, s[l]);
   *hi = high + low;
   *lo = (high - *hi) + low;
 }
 
+static void twice(size_t n, const double *a, const uint32_t *columns, const double *x, double *hi, double *lo) {
+  if (columns)
+    twice_of(n, a, columns, x, hi, lo);
+  else
+    twice_of(n, a, NULL, x, hi, lo);
+}
+
+static inline void add_entry(double a, double factor_hi, double factor_lo, double *hi, double *lo) {
+  plus_product(hi, lo, a, factor_hi);
+  *lo += a * factor_lo;
+}
+
+/* Columns are met once in a row. */
 static void add(size_t n, const double *restrict a, const uint32_t *restrict columns, double factor_hi,
                 double factor_lo, double *restrict hi, double *restrict lo) {
-  for (size_t i = 0; !columns && i < n; i++) {
-    plus_product(&hi[i], &lo[i], a[i], factor_hi);
-    lo[i] += a[i] * factor_lo;
+  size_t i = 0;
+  for (; !columns && i < n; i++) add_entry(a[i], factor_hi, factor_lo, &hi[i], &lo[i]);
+  for (; i + LANES <= n; i += LANES) {
+    double h[LANES], o[LANES];
+    take(hi, columns, i, h);
+    take(lo, columns, i, o);
+    LANES_LOOP(size_t l = 0; l < LANES; l++) add_entry(a[i + l], factor_hi, factor_lo, &h[l], &o[l]);
+    for (size_t l = 0; l < LANES; l++) {
+      hi[columns[i + l]] = h[l];
+      lo[columns[i + l]] = o[l];
+    }
   }
-  for (size_t i = 0; columns && i < n; i++) {
-    plus_product(&hi[columns[i]], &lo[columns[i]], a[i], factor_hi);
-    lo[columns[i]] += a[i] * factor_lo;
-  }
+  for (; i < n; i++) add_entry(a[i], factor_hi, factor_lo, &hi[columns[i]], &lo[columns[i]]);
 }
 
 extern const qp_judge_sums JOIN(qp_judge_sums_, QP_ISA);

@@ -175,6 +175,8 @@ typedef struct row_source {
   size_t rank;
   double *inverse; /* [n] of the metric */
   struct sized_row *order;
+  size_t n, rows;  /* unknowns and rows taken: all, or those of one group */
+  uint32_t *place; /* [o->n] column of an unknown among them */
 } row_source;
 
 typedef struct sized_row {
@@ -214,29 +216,30 @@ static void order_rows(const row_source *s) {
   if (most > ALIKE * least) qsort(s->order, rows, sizeof *s->order, larger_first);
 }
 
-/* Row i of the scaled [W^1/2 A | W^1/2 b; U | 0] -> row `at` of block [n + 1][ld]. */
+/* Row i of the scaled [W^1/2 A | W^1/2 b; U | 0] -> row `at` of block [n + 1][ld]. What is not 0 in it belongs to
+ * unknowns that are taken. */
 static void put_row(const row_source *s, size_t i, double *block, size_t at, size_t ld) {
   const qp_objective *o = s->o;
-  size_t n = o->n;
+  for (size_t j = 0; j <= s->n; j++) block[at + j * ld] = 0;
   if (i >= o->k) {
-    for (size_t j = 0; j < n; j++) block[at + j * ld] = s->root[(i - o->k) + j * n] * s->inverse[j];
-    block[at + n * ld] = 0;
+    for (size_t j = 0; j < o->n; j++) {
+      double value = s->root[(i - o->k) + j * o->n];
+      if (value != 0) block[at + s->place[j] * ld] = value * s->inverse[j];
+    }
     return;
   }
   qp_matrix_row row = qp_row_of(o->problem->a, i);
   double w = sqrt(weight_of(o->problem, i));
-  if (row.columns)
-    for (size_t j = 0; j < n; j++) block[at + j * ld] = 0;
   for (size_t e = 0; e < row.count; e++) {
     size_t j = qp_row_column(&row, e);
-    block[at + j * ld] = w * (row.values[e] * s->inverse[j]);
+    if (row.values[e] != 0) block[at + s->place[j] * ld] = w * (row.values[e] * s->inverse[j]);
   }
-  block[at + n * ld] = o->problem->b ? w * o->problem->b[i] : 0;
+  block[at + s->n * ld] = o->problem->b ? w * o->problem->b[i] : 0;
 }
 
 /* The rows of source -> *triangle [n + 1][*rows], *rows = min(n, all rows). */
 static batten_status reduce_rows(batten_context *ctx, const row_source *source, double **triangle, size_t *rows) {
-  size_t n = source->o->n, all = source->o->k + source->rank, kept = 0, next = 0;
+  size_t n = source->n, all = source->rows, kept = 0, next = 0;
   /* 4 n: the triangle that is carried along costs a quarter more; 512: a block is worth its calls */
   size_t block_rows = 4 * n > 512 ? 4 * n : 512, ld = all < n + block_rows ? all : n + block_rows, count;
   batten_status st = BATTEN_E_NOMEM;
@@ -274,6 +277,134 @@ done:
   return st;
 }
 
+/* ---- Groups of unknowns that no row connects: each is brought to its own triangle ---- */
+
+static size_t leader_of(uint32_t *group, size_t j) {
+  while (group[j] != j) j = group[j] = group[group[j]];
+  return j;
+}
+
+/* Row i of the source as its entries' unknowns meet in one group; its leader, or SIZE_MAX for a row of zeros. */
+static size_t join(const row_source *s, size_t i, uint32_t *group) {
+  const qp_objective *o = s->o;
+  size_t first = SIZE_MAX;
+  bool from_a = i < o->k;
+  qp_matrix_row row = from_a ? qp_row_of(o->problem->a, i) : (qp_matrix_row){.count = o->n};
+  for (size_t e = 0; e < row.count; e++) {
+    size_t j = from_a ? qp_row_column(&row, e) : e;
+    if ((from_a ? row.values[e] : s->root[(i - o->k) + j * o->n]) == 0) continue;
+    j = leader_of(group, j);
+    if (first == SIZE_MAX) first = j;
+    /* the least unknown leads */
+    size_t low = j < first ? j : first, high = j < first ? first : j;
+    group[high] = (uint32_t)low;
+    first = low;
+  }
+  return first;
+}
+
+/* The unknowns of `leader` take the places 0, 1, .. in their order; returns how many. */
+static size_t number(const row_source *s, const uint32_t *group, size_t leader, uint32_t *place) {
+  size_t count = 0;
+  for (size_t j = 0; j < s->o->n; j++)
+    if (group[j] == leader) place[j] = (uint32_t)count++;
+  return count;
+}
+
+/* One triangle of all. */
+static batten_status reduce_all(batten_context *ctx, row_source *source, double **triangle, size_t *rows) {
+  source->n = source->o->n;
+  source->rows = source->o->k + source->rank;
+  for (size_t j = 0; j < source->n; j++) source->place[j] = (uint32_t)j;
+  return reduce_rows(ctx, source, triangle, rows);
+}
+
+/* Triangles of the groups, put into one of all: unknowns keep their order, so it is one. group: leaders of unknowns;
+ * each has as many rows as unknowns. row_group [rows], list [rows] scratch. */
+static batten_status reduce_groups(batten_context *ctx, const row_source *source, const uint32_t *group,
+                                   const uint32_t *row_group, sized_row *list, double **triangle) {
+  size_t n = source->o->n, all = source->o->k + source->rank;
+  double *whole = batten_alloc_array(ctx, n, (n + 1) * sizeof *whole);
+  if (!whole) return BATTEN_E_NOMEM;
+  memset(whole, 0, n * (n + 1) * sizeof *whole);
+  for (size_t leader = 0; leader < n; leader++) {
+    if (group[leader] != leader) continue;
+    row_source part = *source;
+    double *own = NULL;
+    size_t kept;
+    part.n = number(source, group, leader, part.place);
+    part.rows = 0;
+    part.order = list;
+    for (size_t i = 0; i < all; i++)
+      if (row_group[source->order[i].row] == leader) list[part.rows++] = source->order[i];
+    batten_status st = reduce_rows(ctx, &part, &own, &kept);
+    if (st < 0) {
+      batten_free(ctx, whole);
+      return st;
+    }
+    for (size_t j = leader; j <= n; j++) { /* column n: the right side */
+      if (j < n && group[j] != leader) continue;
+      const double *column = own + (j < n ? part.place[j] : part.n) * kept;
+      for (size_t i = leader; i < n && i <= j; i++)
+        if (group[i] == leader) whole[i + j * n] = column[part.place[i]];
+    }
+    batten_free(ctx, own);
+  }
+  *triangle = whole;
+  return BATTEN_OK;
+}
+
+/* Groups of unknowns and rows; true when there are several, each with as many rows as unknowns at least. count [n]
+ * scratch. */
+static bool find_groups(const row_source *source, uint32_t *group, uint32_t *row_group, size_t *count) {
+  const uint32_t NONE = UINT32_MAX;
+  size_t n = source->o->n, all = source->o->k + source->rank, groups = 0;
+  for (size_t j = 0; j < n; j++) group[j] = (uint32_t)j;
+  for (size_t i = 0; i < all; i++) {
+    size_t leader = join(source, i, group);
+    row_group[i] = leader == SIZE_MAX ? NONE : (uint32_t)leader;
+  }
+  memset(count, 0, n * sizeof *count);
+  for (size_t i = 0; i < all; i++) {
+    if (row_group[i] == NONE) continue;
+    row_group[i] = (uint32_t)leader_of(group, row_group[i]);
+    count[row_group[i]]++;
+  }
+  for (size_t j = 0; j < n; j++) group[j] = (uint32_t)leader_of(group, j);
+  bool full = true;
+  for (size_t j = n; j-- > 0;) {
+    /* a group's unknowns are taken from its count as they are met, its leader last */
+    full = full && count[group[j]] > 0;
+    count[group[j]] -= count[group[j]] > 0;
+    groups += group[j] == j;
+  }
+  return full && groups > 1;
+}
+
+static batten_status reduce_by_groups(batten_context *ctx, row_source *source, double **triangle, size_t *rows) {
+  size_t n = source->o->n, all = source->o->k + source->rank;
+  batten_status st = BATTEN_E_NOMEM;
+  uint32_t *group = NULL;
+  sized_row *list = NULL;
+  size_t *count = batten_alloc_array(ctx, n, sizeof *count);
+  if (!count) goto done;
+  group = batten_alloc_array(ctx, n + all, sizeof *group);
+  if (!group) goto done;
+  if (!find_groups(source, group, group + n, count)) {
+    st = reduce_all(ctx, source, triangle, rows);
+    goto done;
+  }
+  list = batten_alloc_array(ctx, all, sizeof *list);
+  if (!list) goto done;
+  *rows = n;
+  st = reduce_groups(ctx, source, group, group + n, list, triangle);
+done:
+  batten_free(ctx, list);
+  batten_free(ctx, group);
+  batten_free(ctx, count);
+  return st;
+}
+
 /* The triangle of A and H, made by the first call. */
 static batten_status make_triangle(batten_context *ctx, const qp_objective *o) {
   struct qp_objective_state *state = o->state;
@@ -293,10 +424,13 @@ static batten_status make_triangle(batten_context *ctx, const qp_objective *o) {
   if (!source.order) goto done;
   source.inverse = batten_alloc_array(ctx, o->n, sizeof *source.inverse);
   if (!source.inverse) goto done;
+  source.place = batten_alloc_array(ctx, o->n, sizeof *source.place);
+  if (!source.place) goto done;
   for (size_t j = 0; j < o->n; j++) source.inverse[j] = 1 / o->metric[j];
   order_rows(&source);
-  st = reduce_rows(ctx, &source, &state->triangle, &state->rows);
+  st = reduce_by_groups(ctx, &source, &state->triangle, &state->rows);
 done:
+  batten_free(ctx, source.place);
   batten_free(ctx, source.inverse);
   batten_free(ctx, source.order);
   batten_free(ctx, root);

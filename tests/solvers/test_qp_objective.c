@@ -136,6 +136,29 @@ static void test_factors(batten_context *ctx) {
   }
 }
 
+/* Unknowns j, j + groups, .. meet in rows of A alone and, with a Hessian, one pair more across two groups: their
+ * factors are made apart, and together where one has too few rows. */
+static void test_groups(batten_context *ctx, size_t groups, size_t rows_of_last, bool hessian, double rho) {
+  enum { N = 14, K = 60 };
+  uint64_t seed = 3;
+  double *a = calloc(K * N, sizeof *a), *b = vector(K, &seed), *g = vector(N, &seed), h[N * N] = {0}, w[K];
+  for (size_t i = 0, last = 0; i < K; i++) {
+    size_t mine = i % groups;
+    w[i] = i % 5 == 3 ? 1e-6 : 1 + t_uniform(&seed);
+    if (mine == groups - 1 && last++ >= rows_of_last) continue; /* a row of zeros */
+    for (size_t j = mine; j < N; j += groups) a[i * N + j] = uniform(&seed);
+  }
+  h[0] = h[1 * N + 1] = 2, h[1] = h[N] = 1;
+  batten_matrix rows = batten_matrix_dense(K, N, a), tension = batten_matrix_dense(N, N, h);
+  batten_qp_problem p = batten_qp_problem_default(N);
+  p.a = &rows, p.b = b, p.g = g, p.weights = w;
+  if (hessian) p.h = &tension;
+  char what[80];
+  snprintf(what, sizeof what, "%zu groups, %zu rows in the last%s", groups, rows_of_last, hessian ? ", joined" : "");
+  check_factor(ctx, &p, rho, what);
+  free(g), free(b), free(a);
+}
+
 /* Two unknowns by hand: (x + y - 2)^2 / 2 + 4 y^2 / 2. */
 static void test_by_hand(batten_context *ctx) {
   static const double a[] = {1, 1, 0, 2}, b[] = {2, 0};
@@ -526,6 +549,11 @@ static void test_memory(void) {
 
 int main(void) {
   batten_context *ctx = t_context(NULL, NULL, 1);
+  test_groups(ctx, 3, 60, false, 0);
+  test_groups(ctx, 3, 60, true, 0);
+  test_groups(ctx, 3, 2, false, 0.5);
+  test_groups(ctx, 7, 60, true, 0.01);
+  test_groups(ctx, 14, 60, false, 0);
   test_by_hand(ctx);
   test_factors(ctx);
   test_condition(ctx);
