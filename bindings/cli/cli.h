@@ -7,6 +7,7 @@
 #include <batten/exchange.h>
 #include <getopt.h>
 #include <jansson.h>
+#include <limits.h>
 #include <signal.h>
 #include <stdbool.h>
 #include <stddef.h>
@@ -120,6 +121,40 @@ bool cli_outputs_commit(cli_outputs *o);
 /* Removes what was staged and not committed. */
 void cli_outputs_close(cli_outputs *o);
 
+/* ---- command.c: what every subcommand does around its work ---- */
+
+/* First member of each command's own request. */
+typedef struct cli_request {
+  const char *input;
+  cli_outputs outputs;
+  size_t memory;    /* 0 = default */
+  unsigned threads; /* 0 = all cores */
+  bool quiet, help;
+} cli_request;
+
+/* Keys of the options that commands share, and their rows; a command's own keys follow CLI_KEY_OWN. */
+enum { CLI_KEY_REPORT = CHAR_MAX + 1, CLI_KEY_MEMORY, CLI_KEY_THREADS, CLI_KEY_OWN };
+#define CLI_OPTION_REPORT                                                                                  \
+  {"report", CLI_KEY_REPORT, "FILE",                                                                       \
+   "figures as a flat JSON object (keys: docs/report.md); - prints them in\nplace of the summary"}
+#define CLI_OPTION_MEMORY \
+  {"memory", CLI_KEY_MEMORY, "SIZE", "use at most so much, for instance 2G; default 90 % of what the machine has"}
+#define CLI_OPTION_THREADS \
+  {"threads", CLI_KEY_THREADS, "N", "threads; default all cores (BLAS has its own: OPENBLAS_NUM_THREADS)"}
+#define CLI_OPTION_QUIET {"quiet", 'q', NULL, "no summary, no progress"}
+#define CLI_OPTION_HELP {"help", 'h', NULL, "this text"}
+
+typedef struct cli_command {
+  const char *name, *operand; /* "qp", "problem" */
+  const cli_option *table;
+  void (*print_help)(void);
+  bool (*take)(cli_request *q, int key, const char *value); /* own options; false after a line on stderr */
+  int (*work)(cli_request *q);                              /* returns the exit status */
+} cli_command;
+
+/* Parses, then prints the help or checks the outputs and works. Returns the exit status. */
+int cli_command_run(const cli_command *c, cli_request *q, int argc, char **argv);
+
 /* ---- report.c: a flat JSON object of figures ---- */
 typedef struct cli_report {
   json_t *object;
@@ -137,7 +172,8 @@ void cli_report_text(cli_report *r, const char *key, const char *value); /* NULL
 void cli_report_null(cli_report *r, const char *key);
 /* batten_version, blas, blas_threads, threads, status, status_text, time_total_s, peak_bytes. */
 void cli_report_common(cli_report *r, const cli_run *run, batten_status status);
-bool cli_report_write(const cli_report *r, const char *path, const char *shown);
+/* To each report among the outputs; false after a line on stderr. */
+bool cli_report_write(const cli_report *r, const cli_outputs *outputs);
 
 /* Lines "  name   value unit" on stdout. */
 void cli_line(const char *name, const char *format, ...) BATTEN_PRINTF(2, 3);

@@ -8,23 +8,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { OPT_REPORT = CHAR_MAX + 1, OPT_THREADS };
-
 static const cli_option table[] = {
-    {"report", OPT_REPORT, "FILE",
-     "figures as a flat JSON object (keys: docs/report.md); - prints them in\nplace of the summary"},
-    {"threads", OPT_THREADS, "N", "threads; default all cores"},
-    {"quiet", 'q', NULL, "no summary"},
-    {"help", 'h', NULL, "this text"},
-    {0},
+    CLI_OPTION_REPORT, CLI_OPTION_THREADS, CLI_OPTION_QUIET, CLI_OPTION_HELP, {0},
 };
-
-typedef struct request {
-  const char *input;
-  cli_outputs outputs;
-  size_t threads;
-  bool quiet, help;
-} request;
 
 static void print_help(void) {
   printf(
@@ -34,42 +20,6 @@ static void print_help(void) {
       "a solid or a carrier saved by batten, a quadratic program (its sizes, which engine would solve it).\n\n");
   cli_options_print(table);
   printf("\nexample:\n\n  batten inspect mesh.ply --report mesh.json\n");
-}
-
-static int parse(int argc, char **argv, request *q) {
-  cli_options o;
-  if (!cli_options_open(&o, "inspect", table, argc, argv)) return CLI_FAILED;
-  int status = CLI_DONE, key;
-  while (status == CLI_DONE && !q->help && (key = cli_options_next(&o)) != CLI_OPTIONS_END) {
-    bool ok = true;
-    switch (key) {
-      case CLI_OPTIONS_BAD:
-        ok = false;
-        break;
-      case 'h':
-        q->help = true;
-        break;
-      case 'q':
-        q->quiet = true;
-        break;
-      case OPT_REPORT:
-        ok = cli_outputs_add(&q->outputs, CLI_OUTPUT_REPORT, o.value);
-        break;
-      default:
-        ok = cli_parse_count("--threads", o.value, 1, 64, &q->threads);
-    }
-    if (!ok) status = CLI_USAGE;
-  }
-  if (status == CLI_DONE && !q->help) {
-    if (optind >= argc)
-      status = cli_usage("inspect", "no file");
-    else if (optind + 1 < argc)
-      status = cli_usage("inspect", "one file at a time, not also '%s'", argv[optind + 1]);
-    else
-      q->input = argv[optind];
-  }
-  cli_options_close(&o);
-  return status;
 }
 
 /* ---- kinds --------------------------------------------------------------------------------------- */
@@ -205,10 +155,17 @@ static batten_status tell_qp(cli_run *run, const char *path, bool print, cli_rep
   return st;
 }
 
-static int work(request *q) {
-  static const char *const kinds[] = {"unknown", "points", "mesh", "solid", "carrier", "quadratic program", "document"};
+/* All options are those that commands share. */
+static bool no_option(cli_request *q, int key, const char *value) {
+  (void)q, (void)key, (void)value;
+  return false;
+}
+
+static int work(cli_request *q) {
+  static const char *const kinds[] = {"unknown",           "points",  "mesh", "solid", "carrier",
+                                      "quadratic program", "document"};
   cli_run run;
-  if (!cli_run_open(&run, (unsigned)q->threads, 0, q->quiet)) return CLI_FAILED;
+  if (!cli_run_open(&run, q->threads, 0, q->quiet)) return CLI_FAILED;
   run.input = q->input;
   run.outputs = &q->outputs;
   cli_report report;
@@ -241,16 +198,14 @@ static int work(request *q) {
       case BATTEN_FILE_DOCUMENT:
         break;
       case BATTEN_FILE_UNKNOWN:
-        st = batten_fail(run.ctx, BATTEN_E_FORMAT, "%s: neither points, a mesh, a quadratic program nor a document of batten", q->input);
+        st = batten_fail(run.ctx, BATTEN_E_FORMAT,
+                         "%s: neither points, a mesh, a quadratic program nor a document of batten", q->input);
     }
   }
   cli_report_number(&report, "time_total_s", batten_now() - run.started);
   cli_report_count(&report, "peak_bytes", batten_bytes_peak(run.ctx));
   int status = st < 0 ? cli_run_failed(&run, st) : CLI_DONE;
-  for (size_t i = 0; status == CLI_DONE && i < q->outputs.count; i++) {
-    const cli_output *f = &q->outputs.items[i];
-    if (!cli_report_write(&report, f->staged ? f->staged : f->target, f->path)) status = CLI_FAILED;
-  }
+  if (status == CLI_DONE && !cli_report_write(&report, &q->outputs)) status = CLI_FAILED;
   if (status == CLI_DONE && !cli_outputs_commit(&q->outputs)) status = CLI_FAILED;
   cli_report_close(&report);
   cli_run_close(&run);
@@ -258,14 +213,7 @@ static int work(request *q) {
 }
 
 int cli_inspect(int argc, char **argv) {
-  request q = {0};
-  int status = parse(argc, argv, &q);
-  if (status == CLI_DONE && q.help)
-    print_help();
-  else if (status == CLI_DONE) {
-    bool usage;
-    status = cli_outputs_check(&q.outputs, q.input, &usage) ? work(&q) : usage ? CLI_USAGE : CLI_FAILED;
-  }
-  cli_outputs_close(&q.outputs);
-  return status;
+  static const cli_command command = {"inspect", "file", table, print_help, no_option, work};
+  cli_request q = {0};
+  return cli_command_run(&command, &q, argc, argv);
 }

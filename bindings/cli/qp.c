@@ -14,24 +14,12 @@
 
 /* ---- command line -------------------------------------------------------------------------------- */
 
-enum {
-  OPT_REPORT = CHAR_MAX + 1,
-  OPT_WRITE,
-  OPT_ENGINE,
-  OPT_TOLERANCE,
-  OPT_EXACT,
-  OPT_START,
-  OPT_TIME_LIMIT,
-  OPT_ITERATIONS,
-  OPT_MEMORY,
-  OPT_THREADS
-};
+enum { OPT_WRITE = CLI_KEY_OWN, OPT_ENGINE, OPT_TOLERANCE, OPT_EXACT, OPT_START, OPT_TIME_LIMIT, OPT_ITERATIONS };
 
 static const cli_option table[] = {
     {"output", 'o', "FILE",
      "solution: .json with multipliers and active set, .csv of x alone; may be given\nmore than once"},
-    {"report", OPT_REPORT, "FILE",
-     "figures as a flat JSON object (keys: docs/report.md); - prints them in\nplace of the summary"},
+    CLI_OPTION_REPORT,
     {"write", OPT_WRITE, "FILE", "the problem itself, as .qps or .json"},
     {"engine", OPT_ENGINE, "NAME",
      "auto (by estimated cost), primal or dual (active sets), interior (point);\ndefault auto"},
@@ -43,10 +31,10 @@ static const cli_option table[] = {
      "same size"},
     {"time-limit", OPT_TIME_LIMIT, "S", "stop after so many seconds, with the best feasible point; default none"},
     {"iterations", OPT_ITERATIONS, "N", "stop after so many pivots or interior steps; default by size, generous"},
-    {"memory", OPT_MEMORY, "SIZE", "use at most so much, for instance 2G; default 90 % of what the machine has"},
-    {"threads", OPT_THREADS, "N", "threads; default all cores (BLAS has its own: OPENBLAS_NUM_THREADS)"},
-    {"quiet", 'q', NULL, "no summary, no progress"},
-    {"help", 'h', NULL, "this text"},
+    CLI_OPTION_MEMORY,
+    CLI_OPTION_THREADS,
+    CLI_OPTION_QUIET,
+    CLI_OPTION_HELP,
     {0},
 };
 
@@ -69,84 +57,35 @@ static void print_help(void) {
       "proof), 2 wrong usage, 130 interrupted\n");
 }
 
-static bool take_option(qp_request *q, int key, const char *v) {
+static bool take(cli_request *common, int key, const char *v) {
   static const char *const engines[] = {"auto", "primal", "dual", "interior", NULL};
+  qp_request *q = (qp_request *)common;
   batten_qp_options *o = &q->options;
-  size_t count = 0;
   int word = 0;
-  bool ok = true;
   switch (key) {
+    case 'o':
+      return cli_outputs_add(&common->outputs, CLI_OUTPUT_QP_SOLUTION, v);
+    case OPT_WRITE:
+      return cli_outputs_add(&common->outputs, CLI_OUTPUT_QP, v);
     case OPT_ENGINE:
-      ok = cli_parse_word("--engine", v, engines, &word);
+      if (!cli_parse_word("--engine", v, engines, &word)) return false;
       o->engine = (batten_qp_engine)word;
-      break;
+      return true;
     case OPT_TOLERANCE:
-      ok = cli_parse_number("--tolerance", v, 1e-300, 1, &o->tolerance_relative);
+      if (!cli_parse_number("--tolerance", v, 1e-300, 1, &o->tolerance_relative)) return false;
       o->tolerance_absolute = o->tolerance_relative;
-      break;
+      return true;
     case OPT_EXACT:
       o->exact = 1;
-      break;
+      return true;
     case OPT_START:
       q->start = v;
-      break;
+      return true;
     case OPT_TIME_LIMIT:
-      ok = cli_parse_number("--time-limit", v, 1e-9, INFINITY, &o->time_limit_s);
-      break;
-    case OPT_ITERATIONS:
-      ok = cli_parse_count("--iterations", v, 1, SIZE_MAX - 1, &o->iteration_limit);
-      break;
-    case OPT_MEMORY:
-      ok = cli_parse_bytes("--memory", v, &q->memory);
-      break;
+      return cli_parse_number("--time-limit", v, 1e-9, INFINITY, &o->time_limit_s);
     default:
-      ok = cli_parse_count("--threads", v, 1, 64, &count);
-      q->threads = (unsigned)count;
+      return cli_parse_count("--iterations", v, 1, SIZE_MAX - 1, &o->iteration_limit);
   }
-  return ok;
-}
-
-/* CLI_DONE: go on; q->help when only that was asked for. */
-static int parse(int argc, char **argv, qp_request *q) {
-  cli_options o;
-  if (!cli_options_open(&o, "qp", table, argc, argv)) return CLI_FAILED;
-  int status = CLI_DONE, key;
-  while (status == CLI_DONE && !q->help && (key = cli_options_next(&o)) != CLI_OPTIONS_END) {
-    bool ok = true;
-    switch (key) {
-      case CLI_OPTIONS_BAD:
-        ok = false;
-        break;
-      case 'h':
-        q->help = true;
-        break;
-      case 'q':
-        q->quiet = true;
-        break;
-      case 'o':
-        ok = cli_outputs_add(&q->outputs, CLI_OUTPUT_QP_SOLUTION, o.value);
-        break;
-      case OPT_WRITE:
-        ok = cli_outputs_add(&q->outputs, CLI_OUTPUT_QP, o.value);
-        break;
-      case OPT_REPORT:
-        ok = cli_outputs_add(&q->outputs, CLI_OUTPUT_REPORT, o.value);
-        break;
-      default:
-        ok = take_option(q, key, o.value);
-    }
-    if (!ok) status = CLI_USAGE;
-  }
-  if (status == CLI_DONE && !q->help) {
-    if (optind >= argc)
-      status = cli_usage("qp", "no problem");
-    else if (optind + 1 < argc)
-      status = cli_usage("qp", "one problem at a time, not also '%s'", argv[optind + 1]);
-    else
-      q->input = argv[optind];
-  }
-  cli_options_close(&o);
-  return status;
 }
 
 /* ---- phases -------------------------------------------------------------------------------------- */
@@ -195,7 +134,7 @@ static batten_status write_solution(qp_work *w, cli_output *f) {
 
 /* Everything to its staged name, the report last, for it tells the times of the others. */
 static int write_outputs(qp_work *w) {
-  cli_outputs *outputs = &w->request->outputs;
+  cli_outputs *outputs = &w->request->common.outputs;
   double start = batten_now();
   for (size_t i = 0; i < outputs->count; i++) {
     cli_output *f = &outputs->items[i];
@@ -208,11 +147,7 @@ static int write_outputs(qp_work *w) {
   cli_report report;
   cli_report_open(&report);
   qp_report(w, &report);
-  bool ok = true;
-  for (size_t i = 0; ok && i < outputs->count; i++) {
-    const cli_output *f = &outputs->items[i];
-    if (f->kind == CLI_OUTPUT_REPORT) ok = cli_report_write(&report, f->staged ? f->staged : f->target, f->path);
-  }
+  bool ok = cli_report_write(&report, outputs);
   cli_report_close(&report);
   cli_run_clear(&w->run);
   if (cli_interrupted()) return cli_run_failed(&w->run, BATTEN_E_CANCELLED);
@@ -233,8 +168,8 @@ static void work_free(qp_work *w) {
   cli_run_close(&w->run);
 }
 
-static int work(qp_request *q) {
-  qp_work w = {.request = q};
+static int work(cli_request *q) {
+  qp_work w = {.request = (qp_request *)q};
   char text[1024];
   if (!cli_run_open(&w.run, q->threads, q->memory, q->quiet)) return CLI_FAILED;
   w.run.input = q->input;
@@ -261,14 +196,7 @@ static int work(qp_request *q) {
 }
 
 int cli_qp(int argc, char **argv) {
+  static const cli_command command = {"qp", "problem", table, print_help, take, work};
   qp_request q = {.options = batten_qp_options_default()};
-  int status = parse(argc, argv, &q);
-  if (status == CLI_DONE && q.help)
-    print_help();
-  else if (status == CLI_DONE) {
-    bool usage;
-    status = cli_outputs_check(&q.outputs, q.input, &usage) ? work(&q) : usage ? CLI_USAGE : CLI_FAILED;
-  }
-  cli_outputs_close(&q.outputs);
-  return status;
+  return cli_command_run(&command, &q.common, argc, argv);
 }

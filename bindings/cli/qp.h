@@ -17,13 +17,9 @@ typedef struct qp_counts {
 } qp_counts;
 
 typedef struct qp_request {
-  const char *input;
+  cli_request common;
   const char *start; /* file of an earlier solution, or NULL */
-  cli_outputs outputs;
   batten_qp_options options;
-  bool quiet, help;
-  size_t memory;
-  unsigned threads;
 } qp_request;
 
 typedef struct qp_work {

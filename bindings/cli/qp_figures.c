@@ -157,7 +157,7 @@ void qp_report(const qp_work *w, cli_report *r) {
   cli_report_text(r, "command", "qp");
   cli_report_common(r, &w->run, w->status);
   cli_report_text(r, "status", qp_status_word(w->status));
-  cli_report_text(r, "input", w->request->input);
+  cli_report_text(r, "input", w->request->common.input);
   qp_report_counts(&w->counts, &w->file, r);
   cli_report_text(r, "engine", qp_engine_name(i->engine));
   cli_report_number(r, "objective", solved ? i->objective : NAN);
@@ -200,8 +200,8 @@ void qp_summary(const qp_work *w) {
     cli_line("exact", "every inequality holds exactly; x was moved by %.1e of the way", i->blend);
   cli_line("time", "%.3f s: solving %.3f, files %.3f", batten_now() - w->run.started, i->time_s,
            w->time_read_s + w->time_write_s);
-  for (size_t k = 0; k < w->request->outputs.count; k++)
-    cli_line(k ? "" : "written", "%s", w->request->outputs.items[k].path);
+  for (size_t k = 0; k < w->request->common.outputs.count; k++)
+    cli_line(k ? "" : "written", "%s", w->request->common.outputs.items[k].path);
 }
 
 /* ---- proofs in words ------------------------------------------------------------------------------ */
@@ -273,7 +273,7 @@ static void append_proof(const qp_work *w, char *text, size_t size, bool sides) 
 
 void qp_explain(const qp_work *w, char *text, size_t size) {
   text[0] = '\0';
-  append(text, size, "%s: ", w->request->input);
+  append(text, size, "%s: ", w->request->common.input);
   if (w->status == BATTEN_E_LIMIT) {
     size_t length = strlen(text);
     cli_run_text(&w->run, w->status, text + length, size - length);

@@ -69,7 +69,7 @@ void cli_report_common(cli_report *r, const cli_run *run, batten_status status) 
   cli_report_count(r, "peak_bytes", batten_bytes_peak(run->ctx));
 }
 
-bool cli_report_write(const cli_report *r, const char *path, const char *shown) {
+static bool write_report(const cli_report *r, const char *path, const char *shown) {
   char *text = r->failed ? NULL : json_dumps(r->object, JSON_INDENT(2) | JSON_REAL_PRECISION(17));
   if (!text) {
     cli_error("%s: out of memory", shown);
@@ -82,6 +82,14 @@ bool cli_report_write(const cli_report *r, const char *path, const char *shown) 
   if (!ok) cli_error("%s: cannot be written: %s", shown, strerror(errno));
   free(text);
   return ok;
+}
+
+bool cli_report_write(const cli_report *r, const cli_outputs *outputs) {
+  for (size_t i = 0; i < outputs->count; i++) {
+    const cli_output *f = &outputs->items[i];
+    if (f->kind == CLI_OUTPUT_REPORT && !write_report(r, f->staged ? f->staged : f->target, f->path)) return false;
+  }
+  return true;
 }
 
 void cli_line(const char *name, const char *format, ...) {

@@ -16,8 +16,7 @@
 /* ---- command line -------------------------------------------------------------------------------- */
 
 enum {
-  OPT_PICTURE = CHAR_MAX + 1,
-  OPT_REPORT,
+  OPT_PICTURE = CLI_KEY_OWN,
   OPT_SAVE,
   OPT_CARRIER,
   OPT_ORDER,
@@ -27,11 +26,9 @@ enum {
   OPT_ORIENT_DATA,
   OPT_ORIENT_METHOD,
   OPT_METHOD,
+  OPT_LOO, /* last of those that tell how to fit */
   OPT_CELL,
   OPT_BOX,
-  OPT_MEMORY,
-  OPT_LOO,
-  OPT_THREADS,
   OPT_VIEW,
   OPT_UP,
   OPT_COLOR,
@@ -45,8 +42,7 @@ static const cli_option table[] = {
      "surface, by extension: .ply .obj .stl .off .vtp .vtu; outline of plane points:\n"
      ".svg .csv .xyz .txt .vtp .obj; may be given more than once"},
     {"picture", OPT_PICTURE, "FILE", "shaded view .png, of plane points .png or .svg"},
-    {"report", OPT_REPORT, "FILE",
-     "figures as a flat JSON object (keys: docs/report.md); - prints them in\nplace of the summary"},
+    CLI_OPTION_REPORT,
     {"save", OPT_SAVE, "FILE", "the solid itself, as JSON that batten reads back to the same bits"},
     {"carrier", OPT_CARRIER, "WHAT",
      "auto, ball, ellipsoid (fitted to the points), none, or a carrier FILE.json;\n"
@@ -63,17 +59,17 @@ static const cli_option table[] = {
     {"cell", OPT_CELL, "LENGTH",
      "edge length of the mesh; default from the points' spacing, but at most\n1/120 of the diagonal of their box"},
     {"box", OPT_BOX, "X0,Y0[,Z0],X1,...", "cut the surface at this box; default: the points' box grown by 25 %"},
-    {"memory", OPT_MEMORY, "SIZE", "use at most so much, for instance 2G; default 90 % of what the machine has"},
+    CLI_OPTION_MEMORY,
     {"loo", OPT_LOO, "N", "leave-one-out errors of N points, all or none; default 256"},
-    {"threads", OPT_THREADS, "N", "threads; default all cores (BLAS has its own: OPENBLAS_NUM_THREADS)"},
+    CLI_OPTION_THREADS,
     {"view", OPT_VIEW, "AZ,EL", "direction of the picture's camera, degrees; default 35,22"},
     {"up", OPT_UP, "AXIS", "x, y or z points upwards in the picture; default z"},
     {"color", OPT_COLOR, "WHAT", "colour the picture by none, gradient, mean or gauss (curvature); default none"},
     {"dots", OPT_DOTS, NULL, "draw the points in the picture"},
     {"size", OPT_SIZE, "W,H", "picture's size in pixels; default 1200,900"},
     {"title", OPT_TITLE, "TEXT", "title in the picture"},
-    {"quiet", 'q', NULL, "no summary, no progress"},
-    {"help", 'h', NULL, "this text"},
+    CLI_OPTION_QUIET,
+    CLI_OPTION_HELP,
     {0},
 };
 
@@ -131,20 +127,13 @@ static bool take_fit_option(solid_request *q, int key, const char *v) {
       ok = cli_parse_word("--method", v, methods, &word);
       q->fit.spline.saddle.method = (batten_saddle_method)word;
       break;
-    case OPT_LOO:
+    default:
       if (strcmp(v, "all") == 0)
         q->fit.spline.loo_samples = SIZE_MAX;
       else if (strcmp(v, "none") == 0)
         q->fit.spline.loo_samples = 0;
       else
         ok = cli_parse_count("--loo", v, 0, SIZE_MAX - 1, &q->fit.spline.loo_samples);
-      break;
-    case OPT_MEMORY:
-      ok = cli_parse_bytes("--memory", v, &q->memory);
-      break;
-    default:
-      ok = cli_parse_count("--threads", v, 1, 64, &count);
-      q->threads = (unsigned)count;
   }
   return ok;
 }
@@ -195,52 +184,18 @@ static bool take_view_option(solid_request *q, int key, const char *v) {
   }
 }
 
-/* CLI_DONE: go on; q->help when only that was asked for. */
-static int parse(int argc, char **argv, solid_request *q) {
-  cli_options o;
-  if (!cli_options_open(&o, "solid", table, argc, argv)) return CLI_FAILED;
-  int status = CLI_DONE, key;
-  while (status == CLI_DONE && !q->help && (key = cli_options_next(&o)) != CLI_OPTIONS_END) {
-    bool ok = true;
-    switch (key) {
-      case CLI_OPTIONS_BAD:
-        ok = false;
-        break;
-      case 'h':
-        q->help = true;
-        break;
-      case 'q':
-        q->quiet = true;
-        break;
-      case 'o':
-        ok = cli_outputs_add(&q->outputs, CLI_OUTPUT_SURFACE, o.value);
-        break;
-      case OPT_PICTURE:
-        ok = cli_outputs_add(&q->outputs, CLI_OUTPUT_PICTURE, o.value);
-        break;
-      case OPT_REPORT:
-        ok = cli_outputs_add(&q->outputs, CLI_OUTPUT_REPORT, o.value);
-        break;
-      case OPT_SAVE:
-        ok = cli_outputs_add(&q->outputs, CLI_OUTPUT_SOLID, o.value);
-        break;
-      default:
-        ok = (key >= OPT_CARRIER && key <= OPT_METHOD) || (key >= OPT_MEMORY && key <= OPT_THREADS)
-                 ? take_fit_option(q, key, o.value)
-                 : take_view_option(q, key, o.value);
-    }
-    if (!ok) status = CLI_USAGE;
+static bool take(cli_request *common, int key, const char *v) {
+  solid_request *q = (solid_request *)common;
+  switch (key) {
+    case 'o':
+      return cli_outputs_add(&common->outputs, CLI_OUTPUT_SURFACE, v);
+    case OPT_PICTURE:
+      return cli_outputs_add(&common->outputs, CLI_OUTPUT_PICTURE, v);
+    case OPT_SAVE:
+      return cli_outputs_add(&common->outputs, CLI_OUTPUT_SOLID, v);
+    default:
+      return key <= OPT_LOO ? take_fit_option(q, key, v) : take_view_option(q, key, v);
   }
-  if (status == CLI_DONE && !q->help) {
-    if (optind >= argc)
-      status = cli_usage("solid", "no file of points");
-    else if (optind + 1 < argc)
-      status = cli_usage("solid", "one file of points at a time, not also '%s'", argv[optind + 1]);
-    else
-      q->input = argv[optind];
-  }
-  cli_options_close(&o);
-  return status;
 }
 
 /* ---- phases -------------------------------------------------------------------------------------- */
@@ -248,7 +203,7 @@ static int parse(int argc, char **argv, solid_request *q) {
 static batten_status read_points(solid_work *w) {
   double start = batten_now();
   batten_read_points_options o = batten_read_points_options_default();
-  batten_status st = batten_read_points(w->run.ctx, w->request->input, &o, &w->cloud);
+  batten_status st = batten_read_points(w->run.ctx, w->request->common.input, &o, &w->cloud);
   w->time_read_s = batten_now() - start;
   return st;
 }
@@ -263,7 +218,7 @@ static int count_numbers(const char *text) {
 static int check_dimension(solid_work *w) {
   solid_request *q = w->request;
   unsigned n = w->cloud.n;
-  if (!cli_outputs_check_dimension(&q->outputs, n)) return CLI_USAGE;
+  if (!cli_outputs_check_dimension(&q->common.outputs, n)) return CLI_USAGE;
   if (q->box) {
     double box[6];
     if (count_numbers(q->box) != (int)(2 * n)) {
@@ -280,7 +235,7 @@ static int check_dimension(solid_work *w) {
     }
   }
   if (q->fit.orientation == BATTEN_ORIENT_GIVEN && !w->cloud.normals) {
-    cli_error("%s: has no normals, which --orientation given needs; use --orientation estimate", q->input);
+    cli_error("%s: has no normals, which --orientation given needs; use --orientation estimate", q->common.input);
     return CLI_FAILED;
   }
   if (2 * q->fit.spline.m <= n) {
@@ -384,8 +339,8 @@ static batten_status draw(solid_work *w, const char *path) {
 static int write_outputs(solid_work *w) {
   solid_request *q = w->request;
   double start = batten_now();
-  for (size_t i = 0; i < q->outputs.count; i++) {
-    const cli_output *f = &q->outputs.items[i];
+  for (size_t i = 0; i < q->common.outputs.count; i++) {
+    const cli_output *f = &q->common.outputs.items[i];
     const char *path = f->staged ? f->staged : f->target;
     batten_status st = BATTEN_OK;
     if (f->kind == CLI_OUTPUT_SURFACE)
@@ -401,15 +356,11 @@ static int write_outputs(solid_work *w) {
   cli_report report;
   cli_report_open(&report);
   solid_report(w, &report);
-  bool ok = true;
-  for (size_t i = 0; ok && i < q->outputs.count; i++) {
-    const cli_output *f = &q->outputs.items[i];
-    if (f->kind == CLI_OUTPUT_REPORT) ok = cli_report_write(&report, f->staged ? f->staged : f->target, f->path);
-  }
+  bool ok = cli_report_write(&report, &q->common.outputs);
   cli_report_close(&report);
   cli_run_clear(&w->run);
   if (cli_interrupted()) return cli_run_failed(&w->run, BATTEN_E_CANCELLED);
-  return ok && cli_outputs_commit(&q->outputs) ? CLI_DONE : CLI_FAILED;
+  return ok && cli_outputs_commit(&q->common.outputs) ? CLI_DONE : CLI_FAILED;
 }
 
 static void work_free(solid_work *w) {
@@ -424,8 +375,8 @@ static void work_free(solid_work *w) {
   }
 }
 
-static int work(solid_request *q) {
-  solid_work w = {.request = q};
+static int work(cli_request *q) {
+  solid_work w = {.request = (solid_request *)q};
   if (!cli_run_open(&w.run, q->threads, q->memory, q->quiet)) return CLI_FAILED;
   w.run.input = q->input;
   w.run.outputs = &q->outputs;
@@ -446,20 +397,10 @@ done:
 }
 
 int cli_solid(int argc, char **argv) {
+  static const cli_command command = {"solid", "file of points", table, print_help, take, work};
   solid_request q = {.carrier = "auto",
                      .fit = batten_solid_options_default(),
                      .surface = batten_polygonize_options_default(),
                      .picture = batten_picture_options_default()};
-  int status = parse(argc, argv, &q);
-  if (status == CLI_DONE && q.help)
-    print_help();
-  else if (status == CLI_DONE) {
-    bool usage;
-    if (cli_outputs_check(&q.outputs, q.input, &usage))
-      status = work(&q);
-    else
-      status = usage ? CLI_USAGE : CLI_FAILED;
-  }
-  cli_outputs_close(&q.outputs);
-  return status;
+  return cli_command_run(&command, &q.common, argc, argv);
 }

@@ -7,15 +7,13 @@
 typedef enum solid_color { SOLID_PLAIN = 0, SOLID_GRADIENT, SOLID_MEAN, SOLID_GAUSS } solid_color;
 
 typedef struct solid_request {
-  const char *input, *carrier, *box;
-  cli_outputs outputs;
+  cli_request common;
+  const char *carrier, *box;
   batten_solid_options fit;
   batten_polygonize_options surface;
   batten_picture_options picture;
   solid_color color;
-  bool dots, quiet, help;
-  size_t memory;
-  unsigned threads;
+  bool dots;
 } solid_request;
 
 typedef struct solid_work {

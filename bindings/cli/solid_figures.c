@@ -183,7 +183,7 @@ void solid_report(const solid_work *w, cli_report *r) {
   unsigned n = w->cloud.n;
   cli_report_text(r, "command", "solid");
   cli_report_common(r, &w->run, w->status);
-  cli_report_text(r, "input", w->request->input);
+  cli_report_text(r, "input", w->request->common.input);
   cli_report_count(r, "dimension", n);
   cli_report_count(r, "points_read", w->info.points_given);
   cli_report_count(r, "points_used", w->info.points_used);
@@ -235,6 +235,6 @@ void solid_summary(const solid_work *w) {
   cli_line("time", "%.2f s: fit %.2f, surface %.2f, files %.2f", batten_now() - w->run.started,
            i->time_fit_s + i->time_check_s + i->time_orient_s, w->time_surface_s, w->time_read_s + w->time_write_s);
   cli_line("memory", "%.0f MB at most", (double)batten_bytes_peak(w->run.ctx) / 1e6);
-  for (size_t k = 0; k < w->request->outputs.count; k++)
-    cli_line(k ? "" : "written", "%s", w->request->outputs.items[k].path);
+  for (size_t k = 0; k < w->request->common.outputs.count; k++)
+    cli_line(k ? "" : "written", "%s", w->request->common.outputs.items[k].path);
 }
