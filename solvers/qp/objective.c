@@ -1,10 +1,10 @@
 /* The objective of a quadratic program: values from the caller's data, triangular factors for the dense engines.
  *
  * Unknowns are scaled by powers of two (metric) to columns of length about one, so that rank is judged alike in
- * whatever units they come. Sums of squares are brought to a triangle by Householder QR, rows by blocks, once for all
- * rho: [W^1/2 A | W^1/2 b]             [T | t]                       [T         | t] [   U    |    0   ]   ->  QR ->
- * [0 | *]      then for rho     [rho^1/2 I | 0]  -> QR -> [R | c] with U'U = H, so that A'A, and with it the square
- * of A's condition, never appears. See objective.h. */
+ * whatever units they come. With U'U = H, sums of squares are brought to a triangle by Householder QR, rows by blocks
+ * and groups of unknowns that no row connects apart, once for all rho:
+ *   [W^1/2 A | W^1/2 b; U | 0] -> [T | t; 0 | *],   then for rho   [T | t; rho^1/2 I | 0] -> [R | c; 0 | *],
+ * so that A'A, and with it the square of A's condition, never appears. See objective.h. */
 #include "objective.h"
 
 #include <float.h>
@@ -111,10 +111,8 @@ static double diagonal_of(const batten_matrix *h, size_t j) {
   return 0;
 }
 
-/* Unknowns without curvature of their own are moved like the stiffest ones. Sizes stay where squares are in range. */
-static void set_metric(const qp_objective *o, double *unit) {
-  const double RANGE = 0x1p500;
-  units_of_columns(o, unit);
+/* metric [n] := sums of the squares of W^1/2 A unit by columns; false when some are near the ends of the range. */
+static bool sum_squares(const qp_objective *o, const double *unit) {
   memset(o->metric, 0, o->n * sizeof *o->metric);
   for (size_t i = 0; i < o->k; i++) {
     qp_matrix_row row = qp_row_of(o->problem->a, i);
@@ -124,6 +122,19 @@ static void set_metric(const qp_objective *o, double *unit) {
       double part = w * row.values[e] * unit[j];
       o->metric[j] += part * part;
     }
+  }
+  bool safe = true;
+  for (size_t j = 0; j < o->n; j++) safe = safe && o->metric[j] > 0x1p-900 && o->metric[j] < 0x1p900;
+  return safe;
+}
+
+/* Unknowns without curvature of their own are moved like the stiffest ones. Sizes stay where squares are in range. */
+static void set_metric(const qp_objective *o, double *unit) {
+  const double RANGE = 0x1p500;
+  for (size_t j = 0; j < o->n; j++) unit[j] = 1;
+  if (!sum_squares(o, unit)) {
+    units_of_columns(o, unit);
+    sum_squares(o, unit);
   }
   double stiffest = 0;
   for (size_t j = 0; j < o->n; j++) {
@@ -293,6 +304,7 @@ static size_t join(const row_source *s, size_t i, uint32_t *group) {
   for (size_t e = 0; e < row.count; e++) {
     size_t j = from_a ? qp_row_column(&row, e) : e;
     if ((from_a ? row.values[e] : s->root[(i - o->k) + j * o->n]) == 0) continue;
+    if (group[j] == first) continue;
     j = leader_of(group, j);
     if (first == SIZE_MAX) first = j;
     /* the least unknown leads */
