@@ -65,6 +65,7 @@ typedef struct qp_limits {
   size_t iterations;    /* at most; SIZE_MAX = none */
   double deadline;      /* on the clock of batten_now(); INFINITY = none */
   double tolerance;     /* of the interior point: relative residuals and gap to go down to */
+  double absolute, relative; /* of it too: and below absolute + relative * size; 0, 0 = no matter */
 } qp_limits;
 
 /* BATTEN_OK to go on; E_LIMIT past the deadline or when count iterations exceed the limit; E_CANCELLED by the host. */

@@ -42,7 +42,14 @@ typedef struct ip {
 
 static double larger(double a, double b) { return !(b <= a) ? b : a; } /* keeps NaN */
 
-ip_figures ip_judge(const qp_scaled *s, const double *x, const double *y, double *scratch_n, double *scratch_m) {
+/* The residual against what is allowed. */
+static double against(const qp_limits *limits, double residual, double size) {
+  double allowed = limits->tolerance * (1 + size), asked = limits->absolute + limits->relative * size;
+  return residual / (asked > 0 && asked < allowed ? asked : allowed);
+}
+
+ip_figures ip_judge(const qp_scaled *s, const qp_limits *limits, const double *x, const double *y, double *scratch_n,
+                    double *scratch_m) {
   ip_figures f = {0};
   double scale_primal = 0, scale_dual = 0, quadratic = 0, linear = 0, dual_value = 0;
   qp_scaled_rows(s, x, scratch_m);
@@ -64,10 +71,13 @@ ip_figures ip_judge(const qp_scaled *s, const double *x, const double *y, double
   qp_scaled_add(s, -1, y, scratch_n);
   for (size_t j = 0; j < s->n; j++) f.dual = larger(f.dual, fabs(scratch_n[j]) / (s->e[j] * s->cost));
   double gap = quadratic + linear - dual_value, value = quadratic / 2 + linear;
+  f.gap = fabs(gap) / s->cost;
+  f.merit = larger(against(limits, f.primal, scale_primal),
+                   larger(against(limits, f.dual, scale_dual), against(limits, f.gap, fabs(value) / s->cost)));
   f.primal /= 1 + scale_primal;
   f.dual /= 1 + scale_dual;
-  f.gap = fabs(gap) / (s->cost + fabs(value));
-  f.merit = larger(f.primal, larger(f.dual, f.gap));
+  f.gap /= 1 + fabs(value) / s->cost;
+  f.largest = larger(f.primal, larger(f.dual, f.gap));
   return f;
 }
 
@@ -302,7 +312,7 @@ static void ip_free(batten_context *ctx, ip *p) {
 /* ---- the method ---- */
 
 static void keep_best(ip *p) {
-  p->figures = ip_judge(p->s, p->x, p->y, p->r1, p->r2);
+  p->figures = ip_judge(p->s, p->limits, p->x, p->y, p->r1, p->r2);
   if (p->have_best && !(p->figures.merit < p->best.merit)) return;
   p->best = p->figures;
   p->have_best = true;
@@ -384,21 +394,23 @@ static void direction(ip *p, double *a, double *b) {
 
 static batten_status iterate(batten_context *ctx, ip *p, size_t *count) {
   const double NEARLY = 1e-8; /* residuals that no problem without solution reaches */
-  const size_t PATIENCE = 30; /* steps without a better point or smaller mu */
+  const double NEAR = 1e-12;  /* relative: what is left may be rounding */
+  const size_t PATIENCE = 30, LITTLE = 3; /* steps without a better point or smaller mu */
   size_t idle = 0;
   double mark = INFINITY, least_mu = INFINITY; /* of the last progress worth the name */
   double a = 0, b = 0;
   for (*count = 0;; ++*count) {
     residuals(p);
     keep_best(p);
-    if (p->best.merit <= p->limits->tolerance) return BATTEN_OK;
+    if (p->best.merit <= 1) return BATTEN_OK;
     idle++;
     if (p->best.merit < 0.9 * mark || p->mu < 0.5 * least_mu) {
       mark = fmin(mark, p->best.merit);
       least_mu = fmin(least_mu, p->mu);
       idle = 0;
     }
-    if (idle > PATIENCE || !isfinite(p->figures.merit)) return BATTEN_W_ACCURACY;
+    bool near = p->best.largest <= NEAR && p->figures.largest <= 100 * NEAR;
+    if (idle > (near ? LITTLE : PATIENCE) || !isfinite(p->figures.merit)) return BATTEN_W_ACCURACY;
     batten_status st = qp_limits_check(ctx, p->limits, *count, 1 - 1 / (1 + 0.1 * (double)*count));
     if (st < 0) return st;
     if (p->figures.primal > NEARLY && ip_prove_infeasible(&p->newton, &p->work, p->y, p->work.y))
@@ -432,6 +444,7 @@ static void guess(const ip *p, const double *x, const double *y, double *ax, sig
 /* The caller's working set may be the answer already. */
 static bool try_warm(ip *p, const qp_point *point) {
   const size_t ROUNDS = 4;
+  const double ENOUGH = 1e-13;
   const qp_scaled *s = p->s;
   bool warm = false;
   for (size_t k = 0; k < s->m; k++) warm |= point->active[k] == QP_LOWER || point->active[k] == QP_UPPER;
@@ -441,10 +454,10 @@ static bool try_warm(ip *p, const qp_point *point) {
     bool has = p->kind[k] == IP_EQUAL || (p->kind[k] & (point->active[k] == QP_UPPER ? IP_UPPER : IP_LOWER));
     point->active[k] = p->kind[k] == IP_EQUAL ? QP_EQUAL : has ? point->active[k] : QP_FREE;
   }
-  ip_figures none = {.merit = INFINITY};
-  p->best = ip_polish(&p->newton, &p->work, none, p->limits->tolerance, p->best_x, p->best_y, point->active, ROUNDS);
+  ip_figures none = {.largest = INFINITY, .merit = INFINITY};
+  p->best = ip_polish(&p->newton, p->limits, &p->work, none, ENOUGH, p->best_x, p->best_y, point->active, ROUNDS);
   p->have_best = p->best.merit < INFINITY;
-  return p->best.merit <= p->limits->tolerance;
+  return p->best.merit <= 1;
 }
 
 /* The point, or the proof, in the engine's units. */
@@ -477,8 +490,8 @@ batten_status qp_interior(batten_context *ctx, const qp_sparse *objective, const
     st = iterate(ctx, &p, &count);
     if (st >= 0) {
       guess(&p, p.best_x, p.best_y, p.ax, point->active);
-      p.best = ip_polish(&p.newton, &p.work, p.best, POLISHED, p.best_x, p.best_y, point->active, POLISH_ROUNDS);
-      if (p.best.merit <= limits->tolerance) st = BATTEN_OK;
+      p.best = ip_polish(&p.newton, limits, &p.work, p.best, POLISHED, p.best_x, p.best_y, point->active, POLISH_ROUNDS);
+      if (p.best.merit <= 1) st = BATTEN_OK;
     }
   }
   point->iterations += count;

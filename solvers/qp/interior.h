@@ -10,9 +10,10 @@
 /* Of each row, which sides it has. */
 enum { IP_EQUAL = 0, IP_LOWER = 1, IP_UPPER = 2, IP_BOTH = 3 };
 
-/* Relative residuals of a point, in the units of the engine's rows and objective; merit is the largest. */
+/* Relative residuals of a point, in the units of the engine's rows and objective, and the largest of them. merit: the
+ * largest against what the limits allow, 1 = there. */
 typedef struct ip_figures {
-  double primal, dual, gap, merit;
+  double primal, dual, gap, largest, merit;
 } ip_figures;
 
 enum { IP_KRYLOV = 6 }; /* vectors for where refinement stalls */
@@ -41,17 +42,18 @@ void ip_newton_factor(ip_newton *k, double rho_least, double w_least);
 double ip_newton_solve(ip_newton *k, double enough, const double *r1, const double *r2, double *dx, double *dy);
 
 /* Figures of x, y: y_k > 0 pushes from the lower side. scratch [n], [m]. */
-ip_figures ip_judge(const qp_scaled *s, const double *x, const double *y, double *scratch_n, double *scratch_m);
+ip_figures ip_judge(const qp_scaled *s, const qp_limits *limits, const double *x, const double *y,
+                    double *scratch_n, double *scratch_m);
 
-/* Solves on the guessed active set, corrects the guess, and replaces x, y, active where that is better. Returns the
- * figures of what is then there. x, y scaled. */
+/* Solves on the guessed active set, corrects the guess, and replaces x, y, active where that is better, until the
+ * largest relative residual is below enough. Returns the figures of what is then there. x, y scaled. */
 typedef struct ip_polish_work {
   double *x, *y, *dx, *dy, *r1, *r2; /* [n] or [m] */
   qp_twice *sum;                     /* [n] */
   signed char *tried;
 } ip_polish_work;
-ip_figures ip_polish(ip_newton *k, ip_polish_work *work, ip_figures before, double enough, double *x, double *y,
-                     signed char *active, size_t rounds);
+ip_figures ip_polish(ip_newton *k, const qp_limits *limits, ip_polish_work *work, ip_figures before, double enough,
+                     double *x, double *y, signed char *active, size_t rounds);
 
 /* Whether y (x) points to a proof that there is no feasible point (no minimum); then the sharpened proof [m] ([n]) is
  * in proof, scaled as y and x are. Uses k's matrix: it has to be factored anew afterwards. */

@@ -78,8 +78,8 @@ static size_t change(const qp_scaled *s, ip_polish_work *p, const double *ax) {
   return changes;
 }
 
-ip_figures ip_polish(ip_newton *k, ip_polish_work *p, ip_figures before, double enough, double *x, double *y,
-                     signed char *active, size_t rounds) {
+ip_figures ip_polish(ip_newton *k, const qp_limits *limits, ip_polish_work *p, ip_figures before, double enough,
+                     double *x, double *y, signed char *active, size_t rounds) {
   const qp_scaled *s = k->s;
   ip_figures best = before;
   memcpy(p->tried, active, s->m);
@@ -87,7 +87,7 @@ ip_figures ip_polish(ip_newton *k, ip_polish_work *p, ip_figures before, double 
   for (size_t i = 0; i < s->m; i++) p->y[i] = active[i] ? y[i] : 0;
   for (size_t round = 0; round < rounds; round++) {
     solve(k, p);
-    ip_figures f = ip_judge(s, p->x, p->y, p->r1, p->r2);
+    ip_figures f = ip_judge(s, limits, p->x, p->y, p->r1, p->r2);
     if (f.merit < best.merit) {
       best = f;
       memcpy(x, p->x, s->n * sizeof *x);
@@ -95,7 +95,7 @@ ip_figures ip_polish(ip_newton *k, ip_polish_work *p, ip_figures before, double 
       memcpy(active, p->tried, s->m);
     }
     qp_scaled_rows(s, p->x, p->r2);
-    if (best.merit <= enough || !isfinite(f.merit) || change(s, p, p->r2) == 0) break;
+    if (best.largest <= enough || !isfinite(f.merit) || change(s, p, p->r2) == 0) break;
   }
   return best;
 }

@@ -376,6 +376,8 @@ static void set_limits(solver *s) {
    */
   double relative = o->tolerance_relative > 0 ? o->tolerance_relative : o->tolerance_absolute;
   limits->tolerance = fmin(fmax(0.01 * relative, 1e-12), 1e-4);
+  limits->absolute = 0.3 * o->tolerance_absolute;
+  limits->relative = 0.3 * o->tolerance_relative;
 }
 
 /* Everything before the first engine. E_INFEASIBLE when presolve has a proof. */
