@@ -272,7 +272,7 @@ size_t qp_bordered_factor(qp_bordered *f, const double *d, const double *w) {
   return repaired + border_factor(f);
 }
 
-void qp_bordered_solve(qp_bordered *f, double *r, double *s) {
+void qp_bordered_solve(qp_bordered *f, double *r, double *s, double *to) {
   double *x = f->x, *border = x + f->band;
   for (size_t j = 0; j < f->n; j++) x[f->place[j]] = r[j];
   for (size_t i = 0; i < f->m; i++) {
@@ -292,13 +292,10 @@ void qp_bordered_solve(qp_bordered *f, double *r, double *s) {
   qp_band_backward(f->band, f->width, f->b, x);
   for (size_t j = 0; j < f->n; j++) r[j] = x[f->place[j]];
   for (size_t i = 0; i < f->m; i++) {
-    if (f->row_place[i] != UINT32_MAX) {
-      s[i] = x[f->row_place[i]];
-      continue;
-    }
-    double sum = -s[i];
+    double sum = 0;
     for (size_t e = f->starts[i]; e < f->starts[i + 1]; e++) sum += f->values[e] * x[f->sorted[e]];
-    s[i] = sum * f->inverse[i];
+    to[i] += sum;
+    s[i] = f->row_place[i] != UINT32_MAX ? x[f->row_place[i]] : (sum - s[i]) * f->inverse[i];
   }
 }
 

@@ -26,13 +26,12 @@ typedef struct ip {
   unsigned char *kind;                                     /* [m] */
   double *x, *dx, *rd, *r1, *best_x;                       /* [n] */
   double *y, *tl, *tu, *vl, *vu, *ax, *rl, *ru;            /* [m] */
-  double *dy, *adx, *dtl, *dtu, *dvl, *dvu, *cl, *cu, *r2; /* [m] */
+  double *dy, *dtl, *dtu, *dvl, *dvu, *cl, *cu, *r2; /* [m] */
   double *best_y;
   double *kept_x, *kept_rows; /* [n], [6 m]: the step from dy on */
   ip_polish_work work;
   double lag_primal, lag_dual; /* residuals before the last step */
   double mu;
-  double value_scale; /* size of the objective, as the gap is judged */
   double error;       /* relative, of the last step's equations */
   ip_figures figures, best;
   bool have_best;
@@ -44,32 +43,34 @@ static double larger(double a, double b) { return !(b <= a) ? b : a; } /* keeps 
 
 /* The residual against what is allowed. */
 static double against(const qp_limits *limits, double residual, double size) {
+  const double ROUNDING = 4e-15;
   double allowed = limits->tolerance * (1 + size), asked = limits->absolute + limits->relative * size;
-  return residual / (asked > 0 && asked < allowed ? asked : allowed);
+  if (asked > 0) allowed = qp_larger(asked < allowed ? asked : allowed, ROUNDING * (1 + size));
+  return residual / allowed;
 }
 
-ip_figures ip_judge(const qp_scaled *s, const qp_limits *limits, const double *x, const double *y, double *scratch_n,
-                    double *scratch_m) {
+ip_figures ip_judge(const qp_scaled *s, const qp_limits *limits, const double *x, const double *y, double *rd,
+                    double *ax) {
   ip_figures f = {0};
   double scale_primal = 0, scale_dual = 0, quadratic = 0, linear = 0, dual_value = 0;
-  qp_scaled_rows(s, x, scratch_m);
+  qp_scaled_rows(s, x, ax);
   for (size_t k = 0; k < s->m; k++) {
-    double ax = scratch_m[k], miss = qp_larger(s->lower[k] - ax, ax - s->upper[k]);
+    double at = ax[k], miss = qp_larger(s->lower[k] - at, at - s->upper[k]);
     if (!(miss <= 0)) f.primal = larger(f.primal, miss / s->f[k]);
-    scale_primal = qp_larger(scale_primal, fabs(ax) / s->f[k]);
+    scale_primal = qp_larger(scale_primal, fabs(at) / s->f[k]);
     double side = y[k] > 0 ? s->lower[k] : s->upper[k];
     if (y[k] != 0 && isfinite(side)) dual_value += y[k] * side;
     if (y[k] != 0 && !isfinite(side)) f.dual = larger(f.dual, fabs(y[k]) * s->f[k] / s->cost);
   }
-  qp_scaled_hessian(s, x, scratch_n);
+  qp_scaled_hessian(s, x, rd);
   for (size_t j = 0; j < s->n; j++) {
-    quadratic += x[j] * scratch_n[j];
+    quadratic += x[j] * rd[j];
     linear += s->g[j] * x[j];
-    scale_dual = qp_larger(scale_dual, qp_larger(fabs(scratch_n[j]), fabs(s->g[j])) / (s->e[j] * s->cost));
-    scratch_n[j] += s->g[j];
+    scale_dual = qp_larger(scale_dual, qp_larger(fabs(rd[j]), fabs(s->g[j])) / (s->e[j] * s->cost));
+    rd[j] += s->g[j];
   }
-  qp_scaled_add(s, -1, y, scratch_n);
-  for (size_t j = 0; j < s->n; j++) f.dual = larger(f.dual, fabs(scratch_n[j]) / (s->e[j] * s->cost));
+  qp_scaled_add(s, -1, y, rd);
+  for (size_t j = 0; j < s->n; j++) f.dual = larger(f.dual, fabs(rd[j]) / (s->e[j] * s->cost));
   double gap = quadratic + linear - dual_value, value = quadratic / 2 + linear;
   f.gap = fabs(gap) / s->cost;
   f.merit = larger(against(limits, f.primal, scale_primal),
@@ -77,32 +78,26 @@ ip_figures ip_judge(const qp_scaled *s, const qp_limits *limits, const double *x
   f.primal /= 1 + scale_primal;
   f.dual /= 1 + scale_dual;
   f.gap /= 1 + fabs(value) / s->cost;
+  f.size = s->cost + fabs(value);
   f.largest = larger(f.primal, larger(f.dual, f.gap));
   return f;
 }
 
-/* Residuals at the present point. */
+/* Residuals and figures at the present point. */
 static void residuals(ip *p) {
   const qp_scaled *s = p->s;
   double sum = 0;
-  qp_scaled_rows(s, p->x, p->ax);
+  for (size_t k = 0; k < s->m; k++)
+    if (p->kind[k] != IP_EQUAL) p->y[k] = p->vl[k] - p->vu[k];
+  p->figures = ip_judge(s, p->limits, p->x, p->y, p->rd, p->ax);
   for (size_t k = 0; k < s->m; k++) {
     double ax = p->ax[k];
     p->rl[k] = p->ru[k] = 0;
     if (p->kind[k] == IP_EQUAL) p->rl[k] = ax - s->lower[k];
     if (p->kind[k] & IP_LOWER) p->rl[k] = ax - s->lower[k] - p->tl[k], sum += p->tl[k] * p->vl[k];
     if (p->kind[k] & IP_UPPER) p->ru[k] = s->upper[k] - ax - p->tu[k], sum += p->tu[k] * p->vu[k];
-    if (p->kind[k] != IP_EQUAL) p->y[k] = p->vl[k] - p->vu[k];
   }
   p->mu = p->sides ? sum / (double)p->sides : 0;
-  qp_scaled_hessian(s, p->x, p->rd);
-  double value = 0;
-  for (size_t j = 0; j < s->n; j++) {
-    value += p->x[j] * (p->rd[j] / 2 + s->g[j]);
-    p->rd[j] += s->g[j];
-  }
-  p->value_scale = s->cost + fabs(value);
-  qp_scaled_add(s, -1, p->y, p->rd);
 }
 
 /* ---- steps ---- */
@@ -128,7 +123,7 @@ static void weights(ip *p) {
 }
 
 /* The step that brings residuals to zero and v t to cl, cu beyond their present value: v dt + t dv = c. */
-static void step(ip *p, double enough) {
+static void step(ip *p, double enough, bool ahead) {
   const qp_scaled *s = p->s;
   for (size_t k = 0; k < s->m; k++) {
     double ql = -p->rl[k], qu = -p->ru[k], r = ql;
@@ -141,10 +136,9 @@ static void step(ip *p, double enough) {
     p->r2[k] = r;
   }
   for (size_t j = 0; j < s->n; j++) p->r1[j] = -p->rd[j];
-  p->error = ip_newton_solve(&p->newton, enough, p->r1, p->r2, p->dx, p->dy);
-  qp_scaled_rows(s, p->dx, p->adx);
+  p->error = ip_newton_solve(&p->newton, enough, ahead, p->r1, p->r2, p->dx, p->dy);
   for (size_t k = 0; k < s->m; k++) {
-    double adx = p->adx[k], tl = p->tl[k], vl = p->vl[k], tu = p->tu[k], vu = p->vu[k];
+    double adx = p->newton.ax[k], tl = p->tl[k], vl = p->vl[k], tu = p->tu[k], vu = p->vu[k];
     if (p->kind[k] == IP_LOWER) p->dvl[k] = p->dy[k];
     if (p->kind[k] == IP_UPPER) p->dvu[k] = -p->dy[k];
     if (p->kind[k] == IP_BOTH) {
@@ -240,7 +234,7 @@ static void start(ip *p) {
   }
   for (size_t j = 0; j < s->n; j++) p->r1[j] = -s->g[j];
   ip_newton_factor(&p->newton, 0, 0);
-  ip_newton_solve(&p->newton, FINE, p->r1, p->r2, p->x, p->y);
+  ip_newton_solve(&p->newton, FINE, false, p->r1, p->r2, p->x, p->y);
   qp_scaled_rows(s, p->x, p->ax);
   for (size_t k = 0; k < s->m; k++) {
     double y = p->y[k];
@@ -278,14 +272,14 @@ static void classify(ip *p) {
   }
 }
 
-enum { VECTORS_N = 9, VECTORS_M = 21, KEPT_M = 6 };
+enum { VECTORS_N = 9, VECTORS_M = 20, KEPT_M = 6 };
 
 static batten_status ip_new(batten_context *ctx, const qp_scaled *s, ip *p) {
   size_t n = s->n, m = s->m;
   ip_polish_work *w = &p->work;
   double **of_n[VECTORS_N] = {&p->x, &p->dx, &p->rd, &p->r1, &p->best_x, &w->x, &w->dx, &w->r1, &p->kept_x};
   double **of_m[VECTORS_M] = {&p->y,  &p->tl, &p->tu,  &p->vl,     &p->vu,  &p->ax,  &p->rl,
-                              &p->ru, &p->dy, &p->adx, &p->dtl,    &p->dtu, &p->dvl, &p->dvu,
+                              &p->ru, &p->dy, &p->dtl,    &p->dtu, &p->dvl, &p->dvu,
                               &p->cl, &p->cu, &p->r2,  &p->best_y, &w->y,   &w->dy,  &w->r2};
   double *at = batten_alloc_array(ctx, VECTORS_N * n + (VECTORS_M + KEPT_M) * m, sizeof *at);
   if (!at) return BATTEN_E_NOMEM;
@@ -312,7 +306,6 @@ static void ip_free(batten_context *ctx, ip *p) {
 /* ---- the method ---- */
 
 static void keep_best(ip *p) {
-  p->figures = ip_judge(p->s, p->limits, p->x, p->y, p->r1, p->r2);
   if (p->have_best && !(p->figures.merit < p->best.merit)) return;
   p->best = p->figures;
   p->have_best = true;
@@ -354,7 +347,7 @@ static void correct_centrality(ip *p, double target, double *a, double *b) {
     memcpy(p->kept_x, p->dx, bytes_n);
     memcpy(p->kept_rows, p->dy, bytes_m);
     aim_correct(p, target, fmin(1, (1 + FURTHER) * a0 + FURTHER), fmin(1, (1 + FURTHER) * b0 + FURTHER));
-    step(p, FINE);
+    step(p, FINE, false);
     longest(p, a, b);
     if (*a + *b >= a0 + b0 + WORTH) continue;
     *a = a0;
@@ -371,23 +364,23 @@ static void direction(ip *p, double *a, double *b) {
   weights(p);
   ip_newton_factor(&p->newton, 0, 0);
   aim_zero(p);
-  step(p, ROUGH);
+  step(p, ROUGH, true);
   if (p->error > TOO_WRONG) {
     ip_newton_factor(&p->newton, LEAST, LEAST);
-    step(p, ROUGH);
+    step(p, ROUGH, false);
   }
   longest(p, a, b);
   if (p->sides == 0) {
-    step(p, FINE);
+    step(p, FINE, false);
     return;
   }
   double both = fmin(*a, *b), ratio = mu_after(p, both, both) / p->mu;
   double sigma = fmin(1, qp_larger(1e-8, ratio * ratio * ratio));
   /* Below what the gap asks for, products only lose digits while residuals are still on their way. */
-  double least = 1e-4 * p->limits->tolerance * p->value_scale / (double)p->sides;
+  double least = 1e-4 * p->limits->tolerance * p->figures.size / (double)p->sides;
   double target = qp_larger(sigma * p->mu, least);
   aim_centre(p, target);
-  step(p, FINE);
+  step(p, FINE, false);
   longest(p, a, b);
   correct_centrality(p, target, a, b);
 }
@@ -395,7 +388,7 @@ static void direction(ip *p, double *a, double *b) {
 static batten_status iterate(batten_context *ctx, ip *p, size_t *count) {
   const double NEARLY = 1e-8; /* residuals that no problem without solution reaches */
   const double NEAR = 1e-12;  /* relative: what is left may be rounding */
-  const size_t PATIENCE = 30, LITTLE = 3; /* steps without a better point or smaller mu */
+  const size_t PATIENCE = 30, LITTLE = 2; /* steps without a better point or smaller mu */
   size_t idle = 0;
   double mark = INFINITY, least_mu = INFINITY; /* of the last progress worth the name */
   double a = 0, b = 0;

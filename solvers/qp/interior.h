@@ -14,6 +14,7 @@ enum { IP_EQUAL = 0, IP_LOWER = 1, IP_UPPER = 2, IP_BOTH = 3 };
  * largest against what the limits allow, 1 = there. */
 typedef struct ip_figures {
   double primal, dual, gap, largest, merit;
+  double size; /* of the scaled objective, as the gap is judged */
 } ip_figures;
 
 enum { IP_KRYLOV = 6 }; /* vectors for where refinement stalls */
@@ -26,10 +27,13 @@ typedef struct ip_newton {
   double *w;               /* [m] > 0 */
   double *d;               /* [n] diagonal of the factored system */
   double *factored_w;      /* [general] */
+  double *unit;            /* [m] weight of a row's residual: what it changes in y */
   double *q1, *q2;         /* [n], [m] residual, then correction */
+  double *ax;              /* [m] rows at dx of the last solve */
   double *best_x, *best_y; /* [n], [m] */
   double *hx;              /* [n] scratch */
   double *krylov;          /* [2 IP_KRYLOV + 1][n + m] */
+  bool trusted;            /* the last solve that was checked needed no refinement */
   size_t factorizations;
 } ip_newton;
 
@@ -38,12 +42,14 @@ void ip_newton_free(batten_context *ctx, ip_newton *k);
 /* Factors with w as set; the factored system has at least rho_least and w_least, whatever rho and w are. */
 void ip_newton_factor(ip_newton *k, double rho_least, double w_least);
 /* dx [n], dy [m]; r1, r2 are kept. Refines until the residual is below enough of r, or as far as it goes. Returns
- * what is left, relative. */
-double ip_newton_solve(ip_newton *k, double enough, const double *r1, const double *r2, double *dx, double *dy);
+ * what is left, relative. ahead: the solution is only looked at, so that it goes unchecked as long as others did
+ * without refinement. */
+double ip_newton_solve(ip_newton *k, double enough, bool ahead, const double *r1, const double *r2, double *dx,
+                       double *dy);
 
-/* Figures of x, y: y_k > 0 pushes from the lower side. scratch [n], [m]. */
+/* Figures of x, y: y_k > 0 pushes from the lower side. rd [n] := H x + g - rows'y, ax [m] := rows at x. */
 ip_figures ip_judge(const qp_scaled *s, const qp_limits *limits, const double *x, const double *y,
-                    double *scratch_n, double *scratch_m);
+                    double *rd, double *ax);
 
 /* Solves on the guessed active set, corrects the guess, and replaces x, y, active where that is better, until the
  * largest relative residual is below enough. Returns the figures of what is then there. x, y scaled. */

@@ -16,7 +16,7 @@ batten_status qp_kkt_new(batten_context *ctx, const qp_csr *h, const qp_csr *c, 
   const double FEW = 40; /* operations for each entry of the problem: no order of little fill gains on that */
   double entries = (double)(h->starts[h->rows] + c->starts[c->rows] + c->columns + c->rows);
   qp_bordered *band = NULL;
-  *out = (qp_kkt){.n = c->columns, .m = c->rows};
+  *out = (qp_kkt){.c = *c};
   batten_status st = qp_bordered_new(ctx, h, c, FEW * entries, &band);
   if (st >= 0) take_band(out, band, true);
   if (st != BATTEN_E_TOO_LARGE) return st;
@@ -43,9 +43,11 @@ size_t qp_kkt_factor(qp_kkt *k, const double *d, const double *w) {
   return k->bordered ? qp_bordered_factor(k->bordered, d, w) : qp_ldl_factor(k->ldl, d, w);
 }
 
-void qp_kkt_solve(qp_kkt *k, double *r, double *s) {
-  if (k->bordered)
-    qp_bordered_solve(k->bordered, r, s);
-  else
-    qp_ldl_solve(k->ldl, r, s);
+void qp_kkt_solve(qp_kkt *k, double *r, double *s, double *to) {
+  if (k->bordered) {
+    qp_bordered_solve(k->bordered, r, s, to);
+    return;
+  }
+  qp_ldl_solve(k->ldl, r, s);
+  for (size_t i = 0; i < k->c.rows; i++) to[i] += qp_csr_dot(&k->c, i, r);
 }

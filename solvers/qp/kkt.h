@@ -18,7 +18,7 @@ typedef struct qp_ldl qp_ldl;
 typedef struct qp_bordered qp_bordered;
 
 typedef struct qp_kkt {
-  size_t n, m;
+  qp_csr c;
   qp_ldl *ldl; /* one of the two, the other NULL */
   qp_bordered *bordered;
   double flops; /* of a factorization, in time of ldl.c's */
@@ -32,8 +32,8 @@ void qp_kkt_free(batten_context *ctx, qp_kkt *k);
 
 /* Factors; returns how many pivots were repaired because rounding had eaten them. */
 size_t qp_kkt_factor(qp_kkt *k, const double *d, const double *w);
-/* r [n], s [m] -> x, p. */
-void qp_kkt_solve(qp_kkt *k, double *r, double *s);
+/* r [n], s [m] -> x, p; to [m] += C x, which one of the two knows anyway. */
+void qp_kkt_solve(qp_kkt *k, double *r, double *s, double *to);
 
 batten_status qp_ldl_new(batten_context *ctx, const qp_csr *h, const qp_csr *c, qp_ldl **out);
 void qp_ldl_free(batten_context *ctx, qp_ldl *f);
@@ -47,7 +47,7 @@ batten_status qp_bordered_new(batten_context *ctx, const qp_csr *h, const qp_csr
                               qp_bordered **out);
 void qp_bordered_free(batten_context *ctx, qp_bordered *f);
 size_t qp_bordered_factor(qp_bordered *f, const double *d, const double *w);
-void qp_bordered_solve(qp_bordered *f, double *r, double *s);
+void qp_bordered_solve(qp_bordered *f, double *r, double *s, double *to);
 double qp_bordered_flops(const qp_bordered *f);
 size_t qp_bordered_bytes(const qp_bordered *f);
 

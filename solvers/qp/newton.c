@@ -7,13 +7,15 @@
 batten_status ip_newton_new(batten_context *ctx, const qp_scaled *s, ip_newton *out) {
   size_t n = s->n, m = s->m;
   *out = (ip_newton){.s = s};
-  double *block = batten_alloc_array(ctx, 4 * n + 4 * m, sizeof *block);
+  double *block = batten_alloc_array(ctx, 4 * n + 6 * m, sizeof *block);
   if (!block) return BATTEN_E_NOMEM;
   out->w = block;
   out->factored_w = block + m;
   out->q2 = block + 2 * m;
   out->best_y = block + 3 * m;
-  out->d = block + 4 * m;
+  out->unit = block + 4 * m;
+  out->ax = block + 5 * m;
+  out->d = block + 6 * m;
   out->q1 = out->d + n;
   out->best_x = out->d + 2 * n;
   out->hx = out->d + 3 * n;
@@ -35,24 +37,25 @@ void ip_newton_factor(ip_newton *k, double rho_least, double w_least) {
   double rho = qp_larger(k->rho, rho_least);
   if (k->kkt.bordered) w_least = qp_larger(w_least, CONDENSED);
   for (size_t j = 0; j < s->n; j++) k->d[j] = rho;
-  for (size_t i = 0; i < s->general; i++) k->factored_w[i] = qp_larger(k->w[i], w_least);
-  for (size_t i = s->general; i < s->m; i++) k->d[s->column[i - s->general]] += 1 / qp_larger(k->w[i], w_least);
-  for (size_t i = s->general; i < s->m; i++) k->factored_w[i] = qp_larger(k->w[i], w_least);
+  for (size_t i = 0; i < s->m; i++) {
+    k->factored_w[i] = qp_larger(k->w[i], w_least);
+    k->unit[i] = 1 / qp_larger(1, k->w[i]);
+  }
+  for (size_t i = s->general; i < s->m; i++) k->d[s->column[i - s->general]] += 1 / k->factored_w[i];
   qp_kkt_factor(&k->kkt, k->d, k->factored_w);
   k->factorizations++;
 }
 
-/* q := r - system (dx, dy), r NULL: 0; returns its size: rows count by what they change in y. */
-static double residual(ip_newton *k, const double *r1, const double *r2, const double *dx, const double *dy) {
+/* q := r - system (dx, dy), r NULL: 0; ax: rows at dx. Returns its size: rows count by what they change in y. */
+static double residual(ip_newton *k, const double *r1, const double *r2, const double *dx, const double *dy,
+                       const double *ax) {
   const qp_scaled *s = k->s;
   double size = 0;
-  qp_scaled_hessian(s, dx, k->hx);
-  for (size_t j = 0; j < s->n; j++) k->q1[j] = (r1 ? r1[j] : 0) - k->hx[j] - k->rho * dx[j];
+  for (size_t j = 0; j < s->n; j++) k->q1[j] = (r1 ? r1[j] : 0) - qp_csr_dot(&s->h, j, dx) - k->rho * dx[j];
   qp_scaled_add(s, 1, dy, k->q1);
-  qp_scaled_rows(s, dx, k->q2);
   for (size_t i = 0; i < s->m; i++) {
-    k->q2[i] = (r2 ? r2[i] : 0) - k->q2[i] - k->w[i] * dy[i];
-    size = qp_larger(size, fabs(k->q2[i]) / qp_larger(1, k->w[i]));
+    k->q2[i] = (r2 ? r2[i] : 0) - ax[i] - k->w[i] * dy[i];
+    size = qp_larger(size, fabs(k->q2[i]) * k->unit[i]);
   }
   for (size_t j = 0; j < s->n; j++) size = qp_larger(size, fabs(k->q1[j]));
   return size;
@@ -68,30 +71,30 @@ static double start_residual(ip_newton *k, const double *r1, const double *r2) {
   }
   for (size_t i = 0; i < s->m; i++) {
     k->q2[i] = r2[i];
-    size = qp_larger(size, fabs(r2[i]) / qp_larger(1, k->w[i]));
+    size = qp_larger(size, fabs(r2[i]) * k->unit[i]);
   }
   return size;
 }
 
-/* Adds the factored system's solution for q. */
-static void correct(ip_newton *k, double *dx, double *dy) {
+/* Adds the factored system's solution for q to dx, dy, and rows at it to ax. */
+static void correct(ip_newton *k, double *dx, double *dy, double *ax) {
   const qp_scaled *s = k->s;
   for (size_t i = s->general; i < s->m; i++) k->q1[s->column[i - s->general]] += k->q2[i] / k->factored_w[i];
-  qp_kkt_solve(&k->kkt, k->q1, k->q2);
+  qp_kkt_solve(&k->kkt, k->q1, k->q2, ax);
   for (size_t j = 0; j < s->n; j++) dx[j] += k->q1[j];
   for (size_t i = 0; i < s->general; i++) dy[i] -= k->q2[i];
-  for (size_t i = s->general; i < s->m; i++)
-    dy[i] += (k->q2[i] - k->q1[s->column[i - s->general]]) / k->factored_w[i];
+  for (size_t i = s->general; i < s->m; i++) {
+    double x = k->q1[s->column[i - s->general]];
+    dy[i] += (k->q2[i] - x) / k->factored_w[i];
+    ax[i] += x;
+  }
 }
-
-/* Weight of a row in inner products, as in residual(). */
-static double weight(const ip_newton *k, size_t i) { return 1 / qp_larger(1, k->w[i]); }
 
 static double product(const ip_newton *k, const double *a, const double *b) {
   size_t n = k->s->n, m = k->s->m;
   double sum = 0;
   for (size_t j = 0; j < n; j++) sum += a[j] * b[j];
-  for (size_t i = 0; i < m; i++) sum += a[n + i] * b[n + i] * weight(k, i) * weight(k, i);
+  for (size_t i = 0; i < m; i++) sum += a[n + i] * b[n + i] * k->unit[i] * k->unit[i];
   return sum;
 }
 
@@ -118,8 +121,9 @@ static double krylov(ip_newton *k, const double *r1, const double *r2, double *d
     memset(zi, 0, all * sizeof *zi);
     copy_scaled(n, 1, vi, k->q1);
     copy_scaled(m, 1, vi + n, k->q2);
-    correct(k, zi, zi + n);
-    residual(k, NULL, NULL, zi, zi + n); /* q := - system z */
+    memset(k->ax, 0, m * sizeof *k->ax);
+    correct(k, zi, zi + n, k->ax);
+    residual(k, NULL, NULL, zi, zi + n, k->ax); /* q := - system z */
     copy_scaled(n, -1, k->q1, next);
     copy_scaled(m, -1, k->q2, next + n);
     for (size_t p = 0; p <= used; p++) {
@@ -152,18 +156,25 @@ static double krylov(ip_newton *k, const double *r1, const double *r2, double *d
     for (size_t j = 0; j < n; j++) dx[j] += beta[p] * z[p * all + j];
     for (size_t i = 0; i < m; i++) dy[i] += beta[p] * z[p * all + n + i];
   }
-  return residual(k, r1, r2, dx, dy);
+  qp_scaled_rows(s, dx, k->ax);
+  return residual(k, r1, r2, dx, dy, k->ax);
 }
 
-double ip_newton_solve(ip_newton *k, double enough, const double *r1, const double *r2, double *dx, double *dy) {
+double ip_newton_solve(ip_newton *k, double enough, bool ahead, const double *r1, const double *r2, double *dx,
+                       double *dy) {
   const int ROUNDS = 8, CYCLES = 2;
   const double TOO_LARGE = qp_larger(1e-9, enough);
   const qp_scaled *s = k->s;
   size_t bytes_n = s->n * sizeof *dx, bytes_m = s->m * sizeof *dy;
   memset(dx, 0, bytes_n);
   memset(dy, 0, bytes_m);
+  memset(k->ax, 0, bytes_m);
   double size = start_residual(k, r1, r2), best = size;
   if (size == 0) return 0;
+  if (ahead && k->trusted) {
+    correct(k, dx, dy, k->ax);
+    return enough;
+  }
   bool slow = false;
   int cycles = 0;
   for (int round = 0; round < ROUNDS && best > enough * size; round++) {
@@ -175,14 +186,16 @@ double ip_newton_solve(ip_newton *k, double enough, const double *r1, const doub
       now = krylov(k, r1, r2, dx, dy);
       cycles++;
     } else {
-      correct(k, dx, dy);
-      now = residual(k, r1, r2, dx, dy);
+      correct(k, dx, dy, k->ax);
+      now = residual(k, r1, r2, dx, dy, k->ax);
+      if (round == 0) k->trusted = now <= enough * size;
     }
     if (!(now < best)) {
       memcpy(dx, k->best_x, bytes_n);
       memcpy(dy, k->best_y, bytes_m);
+      qp_scaled_rows(s, dx, k->ax);
       if (slow) break;
-      residual(k, r1, r2, dx, dy);
+      residual(k, r1, r2, dx, dy, k->ax);
       slow = true;
       continue;
     }

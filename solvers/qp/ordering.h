@@ -24,6 +24,14 @@ typedef struct qp_csr {
   const uint32_t *indices;
   const double *values;
 } qp_csr;
+
+/* Row i of a at x. */
+static inline double qp_csr_dot(const qp_csr *a, size_t i, const double *x) {
+  double sum = 0;
+  for (size_t e = a->starts[i]; e < a->starts[i + 1]; e++) sum += a->values[e] * x[a->indices[e]];
+  return sum;
+}
+
 batten_status qp_graph_condensed(batten_context *ctx, const qp_csr *h, const qp_csr *c, const unsigned char *keep,
                                  const unsigned char *drop, size_t most, qp_graph *out);
 /* Pattern of [H C'; C 0]: unknowns first, then rows. */

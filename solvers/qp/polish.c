@@ -51,7 +51,7 @@ static void solve(ip_newton *k, ip_polish_work *p) {
     double size = residuals(s, p);
     if (!(size < 0.5 * before)) break;
     before = size;
-    ip_newton_solve(k, 1e-14, p->r1, p->r2, p->dx, p->dy);
+    ip_newton_solve(k, 1e-14, false, p->r1, p->r2, p->dx, p->dy);
     for (size_t j = 0; j < s->n; j++) p->x[j] += p->dx[j];
     for (size_t i = 0; i < s->m; i++)
       if (p->tried[i]) p->y[i] += p->dy[i];
@@ -94,7 +94,6 @@ ip_figures ip_polish(ip_newton *k, const qp_limits *limits, ip_polish_work *p, i
       memcpy(y, p->y, s->m * sizeof *y);
       memcpy(active, p->tried, s->m);
     }
-    qp_scaled_rows(s, p->x, p->r2);
     if (best.largest <= enough || !isfinite(f.merit) || change(s, p, p->r2) == 0) break;
   }
   return best;

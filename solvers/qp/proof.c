@@ -61,7 +61,7 @@ bool ip_prove_infeasible(ip_newton *k, ip_polish_work *work, const double *y, do
   for (int round = 0; round < 4; round++) {
     left = combination(s, proof, work->r1, k->hx);
     if (left < PROVEN) break;
-    ip_newton_solve(k, 1e-14, work->r1, work->r2, work->dx, work->dy);
+    ip_newton_solve(k, 1e-14, false, work->r1, work->r2, work->dx, work->dy);
     for (size_t i = 0; i < s->m; i++)
       if (proof[i] != 0) proof[i] += work->dy[i];
     drop_impossible(s, proof);
@@ -102,7 +102,7 @@ bool ip_prove_unbounded(ip_newton *k, ip_polish_work *work, const double *x, dou
   for (int round = 0; round < 4; round++) {
     for (size_t j = 0; j < s->n; j++) hd[j] = -hd[j];
     for (size_t i = 0; i < s->m; i++) ad[i] = k->w[i] < 1 ? -ad[i] : 0;
-    ip_newton_solve(k, 1e-14, hd, ad, work->dx, work->dy);
+    ip_newton_solve(k, 1e-14, false, hd, ad, work->dx, work->dy);
     for (size_t j = 0; j < s->n; j++) proof[j] += work->dx[j];
     qp_scaled_rows(s, proof, ad);
     qp_scaled_hessian(s, proof, hd);

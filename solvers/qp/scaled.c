@@ -160,19 +160,13 @@ batten_status qp_scaled_new(batten_context *ctx, const qp_sparse *objective, con
   return BATTEN_OK;
 }
 
-static double csr_dot(const qp_csr *a, size_t i, const double *x) {
-  double sum = 0;
-  for (size_t e = a->starts[i]; e < a->starts[i + 1]; e++) sum += a->values[e] * x[a->indices[e]];
-  return sum;
-}
-
 void qp_scaled_rows(const qp_scaled *s, const double *x, double *out) {
-  for (size_t k = 0; k < s->general; k++) out[k] = csr_dot(&s->c, k, x);
+  for (size_t k = 0; k < s->general; k++) out[k] = qp_csr_dot(&s->c, k, x);
   for (size_t k = s->general; k < s->m; k++) out[k] = x[s->column[k - s->general]];
 }
 
 void qp_scaled_hessian(const qp_scaled *s, const double *x, double *out) {
-  for (size_t i = 0; i < s->n; i++) out[i] = csr_dot(&s->h, i, x);
+  for (size_t i = 0; i < s->n; i++) out[i] = qp_csr_dot(&s->h, i, x);
 }
 
 void qp_scaled_add(const qp_scaled *s, double factor, const double *y, double *to) {

@@ -156,8 +156,8 @@ static void test_systems(void) {
     scene s = scene_new(cases[t].n, cases[t].dense, cases[t].busy, &seed);
     batten_context *ctx = t_context(NULL, NULL, 1);
     size_t n = s.n, m = s.m;
-    double *v = malloc((4 * n + 4 * m) * sizeof *v), *d = v, *r = v + n, *x = v + 2 * n, *x2 = v + 3 * n;
-    double *w = v + 4 * n, *rs = w + m, *p = w + 2 * m, *p2 = w + 3 * m, apart = 0;
+    double *v = malloc((4 * n + 5 * m) * sizeof *v), *d = v, *r = v + n, *x = v + 2 * n, *x2 = v + 3 * n;
+    double *w = v + 4 * n, *rs = w + m, *p = w + 2 * m, *p2 = w + 3 * m, *at = w + 4 * m, apart = 0;
     for (size_t j = 0; j < n; j++) d[j] = t_uniform(&seed), r[j] = t_uniform(&seed) - 0.5;
     for (size_t i = 0; i < m; i++) w[i] = 0.1 + t_uniform(&seed), rs[i] = t_uniform(&seed) - 0.5;
     qp_ldl *ldl = NULL;
@@ -169,8 +169,10 @@ static void test_systems(void) {
       memcpy(x, r, n * sizeof *x), memcpy(p, rs, m * sizeof *p);
       memcpy(x2, r, n * sizeof *x), memcpy(p2, rs, m * sizeof *p);
       qp_ldl_solve(ldl, x, p);
-      qp_bordered_solve(band, x2, p2);
+      for (size_t i = 0; i < m; i++) at[i] = 1;
+      qp_bordered_solve(band, x2, p2, at);
       apart = 0;
+      for (size_t i = 0; i < m; i++) apart = fmax(apart, fabs(at[i] - 1 - qp_csr_dot(&s.c.view, i, x2)));
       for (size_t j = 0; j < n; j++) apart = fmax(apart, fabs(x[j] - x2[j]));
       for (size_t i = 0; i < m; i++) apart = fmax(apart, fabs(p[i] - p2[i]));
       T_RATIO(repaired ? INFINITY : residual(&s, d, w, x, p, r, rs), 1e-12,
