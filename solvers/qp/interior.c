@@ -23,16 +23,16 @@ typedef struct ip {
   const qp_limits *limits;
   size_t sides; /* finite one-sided inequalities */
   double delta;
-  unsigned char *kind;                                     /* [m] */
-  double *x, *dx, *rd, *r1, *best_x;                       /* [n] */
-  double *y, *tl, *tu, *vl, *vu, *ax, *rl, *ru;            /* [m] */
+  unsigned char *kind;                               /* [m] */
+  double *x, *dx, *rd, *r1, *best_x;                 /* [n] */
+  double *y, *tl, *tu, *vl, *vu, *ax, *rl, *ru;      /* [m] */
   double *dy, *dtl, *dtu, *dvl, *dvu, *cl, *cu, *r2; /* [m] */
   double *best_y;
   double *kept_x, *kept_rows; /* [n], [6 m]: the step from dy on */
   ip_polish_work work;
   double lag_primal, lag_dual; /* residuals before the last step */
   double mu;
-  double error;       /* relative, of the last step's equations */
+  double error; /* relative, of the last step's equations */
   ip_figures figures, best;
   bool have_best;
 } ip;
@@ -222,8 +222,25 @@ static void advance(ip *p, double a, double b) {
 
 /* ---- start ---- */
 
-/* Mehrotra's start: least squares for the rows with unit weights, then slacks and multipliers moved inwards. */
+/* Whether every unknown has curvature of its own, as in a least squares fit. */
+static bool is_curved(const qp_scaled *s) {
+  const double LEAST = 1e-3;
+  double low = INFINITY, high = 0;
+  for (size_t j = 0; j < s->n; j++) {
+    double diagonal = 0;
+    for (size_t e = s->h.starts[j]; e < s->h.starts[j + 1]; e++)
+      if (s->h.indices[e] == j) diagonal = s->h.values[e];
+    low = fmin(low, diagonal);
+    high = qp_larger(high, diagonal);
+  }
+  return low > LEAST * high;
+}
+
+/* Mehrotra's start: least squares for the rows with unit weights, then slacks and multipliers moved inwards.
+ * Multipliers of a least squares fit under rows that are nearly dependent (differences, say) are much larger than
+ * those of unit weights; started too small, they keep steps of the slacks short for long. */
 static void start(ip *p) {
+  const double FURTHER = 30;
   p->newton.rho = 0.1, p->delta = 1e-6;
   const qp_scaled *s = p->s;
   double low_t = INFINITY, low_v = INFINITY;
@@ -253,8 +270,10 @@ static void start(ip *p) {
   double more_t = sum_v > 0 ? product / sum_v / 2 : 0, more_v = sum_t > 0 ? product / sum_t / 2 : 0;
   more_t = qp_larger(more_t, shift_t + low_t < 1e-3 ? 1 : 0);
   more_v = qp_larger(more_v, shift_v + low_v < 1e-3 ? 1 : 0);
+  double further = is_curved(s) ? FURTHER : 1;
   for (size_t k = 0; k < s->m; k++) {
     p->tl[k] += more_t, p->tu[k] += more_t, p->vl[k] += more_v, p->vu[k] += more_v;
+    if (k < s->general) p->vl[k] *= further, p->vu[k] *= further;
     if (!(p->kind[k] & IP_LOWER)) p->tl[k] = p->vl[k] = 0;
     if (!(p->kind[k] & IP_UPPER)) p->tu[k] = p->vu[k] = 0;
   }
@@ -278,9 +297,8 @@ static batten_status ip_new(batten_context *ctx, const qp_scaled *s, ip *p) {
   size_t n = s->n, m = s->m;
   ip_polish_work *w = &p->work;
   double **of_n[VECTORS_N] = {&p->x, &p->dx, &p->rd, &p->r1, &p->best_x, &w->x, &w->dx, &w->r1, &p->kept_x};
-  double **of_m[VECTORS_M] = {&p->y,  &p->tl, &p->tu,  &p->vl,     &p->vu,  &p->ax,  &p->rl,
-                              &p->ru, &p->dy, &p->dtl,    &p->dtu, &p->dvl, &p->dvu,
-                              &p->cl, &p->cu, &p->r2,  &p->best_y, &w->y,   &w->dy,  &w->r2};
+  double **of_m[VECTORS_M] = {&p->y,   &p->tl,  &p->tu,  &p->vl, &p->vu, &p->ax, &p->rl,     &p->ru, &p->dy, &p->dtl,
+                              &p->dtu, &p->dvl, &p->dvu, &p->cl, &p->cu, &p->r2, &p->best_y, &w->y,  &w->dy, &w->r2};
   double *at = batten_alloc_array(ctx, VECTORS_N * n + (VECTORS_M + KEPT_M) * m, sizeof *at);
   if (!at) return BATTEN_E_NOMEM;
   memset(at, 0, (VECTORS_N * n + (VECTORS_M + KEPT_M) * m) * sizeof *at);
@@ -360,8 +378,9 @@ static void correct_centrality(ip *p, double target, double *a, double *b) {
 
 /* Predictor and corrector; *a, *b: longest steps of x and t, of y and v. */
 static void direction(ip *p, double *a, double *b) {
-  const double TOO_WRONG = 0.1, LEAST = 1e-6;
+  const double TOO_WRONG = 0.1, LEAST = 1e-6, SMALL = 1e-4, ROUNDING = 1e-15;
   weights(p);
+  p->newton.sharp = p->figures.largest < SMALL && p->figures.dual > ROUNDING;
   ip_newton_factor(&p->newton, 0, 0);
   aim_zero(p);
   step(p, ROUGH, true);
@@ -386,8 +405,8 @@ static void direction(ip *p, double *a, double *b) {
 }
 
 static batten_status iterate(batten_context *ctx, ip *p, size_t *count) {
-  const double NEARLY = 1e-8; /* residuals that no problem without solution reaches */
-  const double NEAR = 1e-12;  /* relative: what is left may be rounding */
+  const double NEARLY = 1e-8;             /* residuals that no problem without solution reaches */
+  const double NEAR = 1e-12;              /* relative: what is left may be rounding */
   const size_t PATIENCE = 30, LITTLE = 2; /* steps without a better point or smaller mu */
   size_t idle = 0;
   double mark = INFINITY, least_mu = INFINITY; /* of the last progress worth the name */
@@ -483,7 +502,8 @@ batten_status qp_interior(batten_context *ctx, const qp_sparse *objective, const
     st = iterate(ctx, &p, &count);
     if (st >= 0) {
       guess(&p, p.best_x, p.best_y, p.ax, point->active);
-      p.best = ip_polish(&p.newton, limits, &p.work, p.best, POLISHED, p.best_x, p.best_y, point->active, POLISH_ROUNDS);
+      p.best =
+          ip_polish(&p.newton, limits, &p.work, p.best, POLISHED, p.best_x, p.best_y, point->active, POLISH_ROUNDS);
       if (p.best.merit <= 1) st = BATTEN_OK;
     }
   }

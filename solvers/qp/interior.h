@@ -33,6 +33,7 @@ typedef struct ip_newton {
   double *best_x, *best_y; /* [n], [m] */
   double *hx;              /* [n] scratch */
   double *krylov;          /* [2 IP_KRYLOV + 1][n + m] */
+  bool sharp;              /* refine until the residual of the unknowns' equations is below that of r1, too */
   bool trusted;            /* the last solve that was checked needed no refinement */
   size_t factorizations;
 } ip_newton;

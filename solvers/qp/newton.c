@@ -46,9 +46,15 @@ void ip_newton_factor(ip_newton *k, double rho_least, double w_least) {
   k->factorizations++;
 }
 
+static double largest_of(size_t count, const double *v) {
+  double most = 0;
+  for (size_t i = 0; i < count; i++) most = qp_larger(most, fabs(v[i]));
+  return most;
+}
+
 /* q := r - system (dx, dy), r NULL: 0; ax: rows at dx. Returns its size: rows count by what they change in y. */
-static double residual(ip_newton *k, const double *r1, const double *r2, const double *dx, const double *dy,
-                       const double *ax) {
+static double residual(ip_newton *k, double *of_unknowns, const double *r1, const double *r2, const double *dx,
+                       const double *dy, const double *ax) {
   const qp_scaled *s = k->s;
   double size = 0;
   for (size_t j = 0; j < s->n; j++) k->q1[j] = (r1 ? r1[j] : 0) - qp_csr_dot(&s->h, j, dx) - k->rho * dx[j];
@@ -57,8 +63,8 @@ static double residual(ip_newton *k, const double *r1, const double *r2, const d
     k->q2[i] = (r2 ? r2[i] : 0) - ax[i] - k->w[i] * dy[i];
     size = qp_larger(size, fabs(k->q2[i]) * k->unit[i]);
   }
-  for (size_t j = 0; j < s->n; j++) size = qp_larger(size, fabs(k->q1[j]));
-  return size;
+  *of_unknowns = largest_of(s->n, k->q1);
+  return qp_larger(size, *of_unknowns);
 }
 
 /* The same at dx = 0, dy = 0. */
@@ -110,7 +116,7 @@ static double krylov(ip_newton *k, const double *r1, const double *r2, double *d
   const qp_scaled *s = k->s;
   size_t n = s->n, m = s->m, all = n + m, used = 0;
   double h[DEPTH + 1][DEPTH], cosine[DEPTH], sine[DEPTH], beta[DEPTH + 1];
-  double *v = k->krylov, *z = v + (DEPTH + 1) * all;
+  double ignored, *v = k->krylov, *z = v + (DEPTH + 1) * all;
   copy_scaled(n, 1, k->q1, v);
   copy_scaled(m, 1, k->q2, v + n);
   beta[0] = sqrt(product(k, v, v));
@@ -123,7 +129,7 @@ static double krylov(ip_newton *k, const double *r1, const double *r2, double *d
     copy_scaled(m, 1, vi + n, k->q2);
     memset(k->ax, 0, m * sizeof *k->ax);
     correct(k, zi, zi + n, k->ax);
-    residual(k, NULL, NULL, zi, zi + n, k->ax); /* q := - system z */
+    residual(k, &ignored, NULL, NULL, zi, zi + n, k->ax); /* q := - system z */
     copy_scaled(n, -1, k->q1, next);
     copy_scaled(m, -1, k->q2, next + n);
     for (size_t p = 0; p <= used; p++) {
@@ -157,12 +163,13 @@ static double krylov(ip_newton *k, const double *r1, const double *r2, double *d
     for (size_t i = 0; i < m; i++) dy[i] += beta[p] * z[p * all + n + i];
   }
   qp_scaled_rows(s, dx, k->ax);
-  return residual(k, r1, r2, dx, dy, k->ax);
+  return residual(k, &ignored, r1, r2, dx, dy, k->ax);
 }
 
 double ip_newton_solve(ip_newton *k, double enough, bool ahead, const double *r1, const double *r2, double *dx,
                        double *dy) {
   const int ROUNDS = 8, CYCLES = 2;
+  const double SHARP = 0.1;
   const double TOO_LARGE = qp_larger(1e-9, enough);
   const qp_scaled *s = k->s;
   size_t bytes_n = s->n * sizeof *dx, bytes_m = s->m * sizeof *dy;
@@ -175,9 +182,10 @@ double ip_newton_solve(ip_newton *k, double enough, bool ahead, const double *r1
     correct(k, dx, dy, k->ax);
     return enough;
   }
+  double left = 0, goal = k->sharp ? SHARP * largest_of(s->n, r1) : INFINITY;
   bool slow = false;
   int cycles = 0;
-  for (int round = 0; round < ROUNDS && best > enough * size; round++) {
+  for (int round = 0; round < ROUNDS && (best > enough * size || (left > goal && !slow)); round++) {
     memcpy(k->best_x, dx, bytes_n);
     memcpy(k->best_y, dy, bytes_m);
     if (slow && (best <= TOO_LARGE * size || cycles == CYCLES)) break;
@@ -187,7 +195,7 @@ double ip_newton_solve(ip_newton *k, double enough, bool ahead, const double *r1
       cycles++;
     } else {
       correct(k, dx, dy, k->ax);
-      now = residual(k, r1, r2, dx, dy, k->ax);
+      now = residual(k, &left, r1, r2, dx, dy, k->ax);
       if (round == 0) k->trusted = now <= enough * size;
     }
     if (!(now < best)) {
@@ -195,7 +203,7 @@ double ip_newton_solve(ip_newton *k, double enough, bool ahead, const double *r1
       memcpy(dy, k->best_y, bytes_m);
       qp_scaled_rows(s, dx, k->ax);
       if (slow) break;
-      residual(k, r1, r2, dx, dy, k->ax);
+      residual(k, &left, r1, r2, dx, dy, k->ax);
       slow = true;
       continue;
     }

@@ -86,7 +86,7 @@ static void free_answer(answer *a) {
 
 static void run(batten_context *ctx, const problem *p, const qp_rows *rows, answer *a) {
   qp_dense objective = {p->n, p->r, p->c};
-  qp_limits limits = {SIZE_MAX, INFINITY, 1e-9};
+  qp_limits limits = {.iterations = SIZE_MAX, .deadline = INFINITY, .tolerance = 1e-9};
   a->point = (qp_point){.x = a->x, .y = a->y, .active = a->active};
   a->status = qp_dual(ctx, &objective, rows, &limits, &a->point);
 }
@@ -606,21 +606,24 @@ static void test_limits(batten_context *ctx) {
   for (size_t limit = 0; limit <= needed; limit += needed / 3) {
     memset(a.active, 0, p.m);
     a.point = (qp_point){.x = a.x, .y = a.y, .active = a.active};
-    batten_status st = qp_dual(ctx, &objective, &rows, &(qp_limits){limit, INFINITY, 0}, &a.point);
+    batten_status st =
+        qp_dual(ctx, &objective, &rows, &(qp_limits){.iterations = limit, .deadline = INFINITY}, &a.point);
     bool enough = limit >= needed;
     T_CHECK(st == (enough ? BATTEN_OK : BATTEN_E_LIMIT) && a.point.have_x == enough, "limit %zu of %zu: %s", limit,
             needed, batten_status_name(st));
   }
   memset(a.active, 0, p.m);
   a.point = (qp_point){.x = a.x, .y = a.y, .active = a.active};
-  batten_status st = qp_dual(ctx, &objective, &rows, &(qp_limits){SIZE_MAX, batten_now() - 1, 0}, &a.point);
+  batten_status st =
+      qp_dual(ctx, &objective, &rows, &(qp_limits){.iterations = SIZE_MAX, .deadline = batten_now() - 1}, &a.point);
   T_CHECK(st == BATTEN_E_LIMIT && !a.point.have_x, "deadline: %s", batten_status_name(st));
   qp_cost cost = qp_dual_cost(&rows);
   run(ctx, &p, &rows, &a);
   a.point.have_x = false;
   batten_bytes_peak_reset(ctx);
   size_t before = batten_bytes_in_use(ctx);
-  qp_dual(ctx, &objective, &rows, &(qp_limits){SIZE_MAX, INFINITY, 0}, &a.point); /* warm: by LAPACK, too */
+  qp_dual(ctx, &objective, &rows, &(qp_limits){.iterations = SIZE_MAX, .deadline = INFINITY},
+          &a.point); /* warm: by LAPACK, too */
   size_t held = batten_bytes_peak(ctx) - before;
   T_CHECK(held <= cost.bytes && cost.bytes < 3 * held && cost.flops > 0, "bytes: %zu held, %zu foretold", held,
           cost.bytes);

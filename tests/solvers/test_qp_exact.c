@@ -38,7 +38,7 @@ static view view_new(const batten_qp_problem *p) {
 static void view_free(view *v) { free(v->row), free(v->identity), free(v->scale), free(v->lower), free(v->upper); }
 
 static uint64_t seed_noise = 9;
-static const qp_limits no_limits = {SIZE_MAX, INFINITY, 1e-12};
+static const qp_limits no_limits = {.iterations = SIZE_MAX, .deadline = INFINITY, .tolerance = 1e-12};
 
 static batten_status exact(batten_context *ctx, const batten_qp_problem *p, const double *interior, const double *x0,
                            double *x, double *blend) {
