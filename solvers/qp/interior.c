@@ -52,14 +52,15 @@ static double against(const qp_limits *limits, double residual, double size) {
 ip_figures ip_judge(const qp_scaled *s, const qp_limits *limits, const double *x, const double *y, double *rd,
                     double *ax) {
   ip_figures f = {0};
-  double scale_primal = 0, scale_dual = 0, quadratic = 0, linear = 0, dual_value = 0;
+  double scale_primal = 0, scale_dual = 0, quadratic = 0, linear = 0, gap = 0;
   qp_scaled_rows(s, x, ax);
+  /* gap = x'rd + sum y (row - side): sums of what is small, where the two values would cancel */
   for (size_t k = 0; k < s->m; k++) {
     double at = ax[k], miss = qp_larger(s->lower[k] - at, at - s->upper[k]);
     if (!(miss <= 0)) f.primal = larger(f.primal, miss / s->f[k]);
     scale_primal = qp_larger(scale_primal, fabs(at) / s->f[k]);
     double side = y[k] > 0 ? s->lower[k] : s->upper[k];
-    if (y[k] != 0 && isfinite(side)) dual_value += y[k] * side;
+    if (y[k] != 0 && isfinite(side)) gap += y[k] * (at - side);
     if (y[k] != 0 && !isfinite(side)) f.dual = larger(f.dual, fabs(y[k]) * s->f[k] / s->cost);
   }
   qp_scaled_hessian(s, x, rd);
@@ -70,8 +71,11 @@ ip_figures ip_judge(const qp_scaled *s, const qp_limits *limits, const double *x
     rd[j] += s->g[j];
   }
   qp_scaled_add(s, -1, y, rd);
-  for (size_t j = 0; j < s->n; j++) f.dual = larger(f.dual, fabs(rd[j]) / (s->e[j] * s->cost));
-  double gap = quadratic + linear - dual_value, value = quadratic / 2 + linear;
+  for (size_t j = 0; j < s->n; j++) {
+    f.dual = larger(f.dual, fabs(rd[j]) / (s->e[j] * s->cost));
+    gap += x[j] * rd[j];
+  }
+  double value = quadratic / 2 + linear;
   f.gap = fabs(gap) / s->cost;
   f.merit = larger(against(limits, f.primal, scale_primal),
                    larger(against(limits, f.dual, scale_dual), against(limits, f.gap, fabs(value) / s->cost)));
@@ -404,17 +408,18 @@ static void direction(ip *p, double *a, double *b) {
   correct_centrality(p, target, a, b);
 }
 
-static batten_status iterate(batten_context *ctx, ip *p, size_t *count) {
+/* Until the limits are met; unless strictly, the relative tolerance will do. */
+static batten_status iterate(batten_context *ctx, ip *p, bool strictly, size_t *count) {
   const double NEARLY = 1e-8;             /* residuals that no problem without solution reaches */
   const double NEAR = 1e-12;              /* relative: what is left may be rounding */
   const size_t PATIENCE = 30, LITTLE = 2; /* steps without a better point or smaller mu */
   size_t idle = 0;
   double mark = INFINITY, least_mu = INFINITY; /* of the last progress worth the name */
   double a = 0, b = 0;
-  for (*count = 0;; ++*count) {
+  for (;; ++*count) {
     residuals(p);
     keep_best(p);
-    if (p->best.merit <= 1) return BATTEN_OK;
+    if (p->best.merit <= 1 || (!strictly && p->best.largest <= p->limits->tolerance)) return BATTEN_OK;
     idle++;
     if (p->best.merit < 0.9 * mark || p->mu < 0.5 * least_mu) {
       mark = fmin(mark, p->best.merit);
@@ -499,12 +504,17 @@ batten_status qp_interior(batten_context *ctx, const qp_sparse *objective, const
   if (st < 0) goto done;
   if (!try_warm(&p, point)) {
     start(&p);
-    st = iterate(ctx, &p, &count);
-    if (st >= 0) {
+    /* The solve on the active set mostly finds the last digits sooner than further steps do. */
+    for (int strictly = 0; strictly < 2; strictly++) {
+      st = iterate(ctx, &p, strictly, &count);
+      if (st < 0) break;
+      double rho = p.newton.rho;
       guess(&p, p.best_x, p.best_y, p.ax, point->active);
       p.best =
           ip_polish(&p.newton, limits, &p.work, p.best, POLISHED, p.best_x, p.best_y, point->active, POLISH_ROUNDS);
+      p.newton.rho = rho;
       if (p.best.merit <= 1) st = BATTEN_OK;
+      if (p.best.merit <= 1 || st != BATTEN_OK) break;
     }
   }
   point->iterations += count;
