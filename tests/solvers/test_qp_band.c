@@ -16,9 +16,9 @@ static double *random_band(size_t n, size_t width, uint64_t *seed) {
 }
 
 static void test_kernels(void) {
-  static const size_t sizes[][2] = {{1, 0},    {1, 5},    {2, 1},    {3, 7},    {5, 4},   {7, 3},
-                                    {50, 0},   {50, 1},   {201, 2},  {202, 4},  {203, 5}, {204, 9},
-                                    {300, 17}, {300, 40}, {333, 71}, {333, 72}, {90, 100}};
+  static const size_t sizes[][2] = {{1, 0},   {1, 5},   {2, 1},    {3, 7},    {5, 4},    {7, 3},    {50, 0},
+                                    {50, 1},  {201, 2}, {200, 3},  {4, 3},    {4, 4},    {5, 4},    {202, 4},
+                                    {203, 5}, {204, 9}, {300, 17}, {300, 40}, {333, 71}, {333, 72}, {90, 100}};
   for (size_t t = 0; t < sizeof sizes / sizeof *sizes; t++) {
     size_t n = sizes[t][0], width = sizes[t][1], ld = width + 1;
     uint64_t seed = 7 + t;
