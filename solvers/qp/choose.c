@@ -8,6 +8,9 @@ static const size_t ALWAYS_DENSE = 48;
 /* Beyond, a dense engine is not tried for want of something better: some ten seconds. */
 static const double AFFORDABLE = 3e10;
 
+/* Beyond, a dense engine is no alternative at all: some minutes. */
+static const double HOPELESS = 30 * 3e10;
+
 static qp_cost saturated_sum(qp_cost a, qp_cost b) {
   qp_cost sum = {0, a.flops + b.flops};
   batten_add(a.bytes, b.bytes, &sum.bytes);
@@ -47,7 +50,11 @@ batten_status qp_choose(batten_context *ctx, const qp_task *task, const batten_q
   factor = factor_cost(task->objective);
   cost[BATTEN_QP_DUAL] = saturated_sum(factor, qp_dual_cost(task->rows));
   cost[BATTEN_QP_PRIMAL] = saturated_sum(factor, qp_primal_cost(task->rows));
-  if (exactly || n > ALWAYS_DENSE) {
+  bool hopeless = cost[BATTEN_QP_DUAL].bytes > left || cost[BATTEN_QP_DUAL].flops > HOPELESS;
+  hopeless = hopeless && (cost[BATTEN_QP_PRIMAL].bytes > left || cost[BATTEN_QP_PRIMAL].flops > HOPELESS);
+  if (!exactly && hopeless) {
+    cost[BATTEN_QP_INTERIOR] = (qp_cost){0, AFFORDABLE}; /* whatever it costs: not worth an ordering to know */
+  } else if (exactly || n > ALWAYS_DENSE) {
     batten_status st = interior_cost(ctx, task, &cost[BATTEN_QP_INTERIOR]);
     if (st < 0 && st != BATTEN_E_TOO_LARGE) return st;
   }
