@@ -256,7 +256,7 @@ static void border_solve(const qp_bordered *f, double *x) {
 
 size_t qp_bordered_factor(qp_bordered *f, const double *d, const double *w) {
   size_t repaired = 0;
-  double top = 0;
+  double top = 0; /* stays 0 where no pivot is a number: nothing can be held then */
   for (double shift = 0;; shift = fmax(100 * shift, 1e-15 * top)) {
     assemble(f, d, w, shift);
     if (repaired == 0)

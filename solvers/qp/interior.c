@@ -507,9 +507,9 @@ batten_status qp_interior(batten_context *ctx, const qp_sparse *objective, const
     /* The solve on the active set mostly finds the last digits sooner than further steps do. */
     for (int strictly = 0; strictly < 2; strictly++) {
       st = iterate(ctx, &p, strictly, &count);
+      guess(&p, p.best_x, p.best_y, p.ax, point->active);
       if (st < 0) break;
       double rho = p.newton.rho;
-      guess(&p, p.best_x, p.best_y, p.ax, point->active);
       p.best =
           ip_polish(&p.newton, limits, &p.work, p.best, POLISHED, p.best_x, p.best_y, point->active, POLISH_ROUNDS);
       p.newton.rho = rho;

@@ -40,8 +40,8 @@ typedef struct presolver {
  * rounding, so that it accepts every proof that is given here. */
 static double crossing(size_t n) { return 2 * (1000 + 8 * (double)n) * DBL_EPSILON; }
 
-/* Unit rows that differ by less in every entry are parallel: entries, length and scale are each rounded once or
- * twice. */
+/* Unit rows that differ by less in every entry, relative to it, are parallel: entries, length and scale are each
+ * rounded once or twice. Not relative to 1: an entry that is small may stand before an unknown that is large. */
 static const double SAME_ROW = 16 * DBL_EPSILON;
 
 /* ---- One row ---- */
@@ -134,15 +134,16 @@ static batten_status conflict(const presolver *s, size_t lower, double lower_fac
                      one, other, by);
 }
 
-/* Sides that cross by rounding, or by less than the caller minds, are made equal; beyond it, no x satisfies them. */
+/* Sides that cross by rounding, or by less than the caller minds, are made equal, so that each gives way by as much
+ * in the caller's units; beyond it, no x satisfies them. */
 static batten_status meet(const presolver *s, double *lower, double *upper, size_t lower_from, double lower_factor,
                           size_t upper_from, double upper_factor) {
   if (*lower <= *upper) return BATTEN_OK;
   double by = *lower - *upper;
-  double minded = s->slack * fmin(fabs(lower_factor), fabs(upper_factor));
+  double both = fmin(fabs(lower_factor) + fabs(upper_factor), DBL_MAX), minded = s->slack * both;
   if (by > crossing(s->n) * (fabs(*lower) + fabs(*upper)) && by > minded)
     return conflict(s, lower_from, lower_factor, upper_from, upper_factor, by);
-  *lower = *upper = *upper + 0.5 * by;
+  *lower = *upper = *upper + fabs(upper_factor) / both * by;
   return BATTEN_OK;
 }
 
@@ -169,7 +170,8 @@ static void tighten(presolver *s, size_t i, size_t j, double a) {
 /* +1 parallel, -1 antiparallel, 0 neither. */
 static int compare_rows(presolver *s, size_t k, size_t i, double scale) {
   qp_matrix_row one = qp_row_of(s->problem->c, s->out->row[k]), other = qp_row_of(s->problem->c, i);
-  double most = 0, unit = s->out->scale[k], worst[2] = {0, 0};
+  double most = 0, unit = s->out->scale[k];
+  bool same = true;
   size_t at = 0;
   for (size_t e = 0; e < one.count; e++) {
     s->work[qp_row_column(&one, e)] = one.values[e] * unit;
@@ -182,15 +184,16 @@ static int compare_rows(presolver *s, size_t k, size_t i, double scale) {
   /* every entry of the other is met in work and taken away there; what is left belongs to the one alone */
   for (size_t e = 0; e < other.count; e++) {
     size_t j = qp_row_column(&other, e);
-    worst[0] = fmax(worst[0], fabs(s->work[j] - sign * (other.values[e] * scale)));
+    double here = s->work[j], entry = sign * (other.values[e] * scale);
+    same &= fabs(here - entry) <= SAME_ROW * fabs(entry);
     s->work[j] = 0;
   }
   for (size_t e = 0; e < one.count; e++) {
     size_t j = qp_row_column(&one, e);
-    worst[1] = fmax(worst[1], fabs(s->work[j]));
+    same &= s->work[j] == 0;
     s->work[j] = 0;
   }
-  if (fmax(worst[0], worst[1]) > SAME_ROW) return 0;
+  if (!same) return 0;
   return sign > 0 ? 1 : -1;
 }
 
@@ -302,6 +305,20 @@ static void prove_by_bounds(const presolver *s, size_t k, double y) {
   }
 }
 
+/* By how much the unit row's range within the bounds grows when the caller minds 1 less of the row and of each bound.
+ */
+static double price(const presolver *s, size_t k, double y) {
+  const qp_presolve *o = s->out;
+  qp_matrix_row row = qp_row_of(s->problem->c, o->row[k]);
+  double sum = fabs(y > 0 ? o->lower_factor[k] : o->upper_factor[k]);
+  for (size_t e = 0; e < row.count; e++) {
+    size_t j = qp_row_column(&row, e);
+    double part = fabs(row.values[e] * o->scale[k]);
+    if (part > 0) sum += part * fabs(y * row.values[e] < 0 ? s->x_lower_factor[j] : s->x_upper_factor[j]);
+  }
+  return sum;
+}
+
 /* Drops sides of constraint k that the bounds imply: both of an equality or none, so that it stays one. */
 static batten_status judge_by_bounds(presolver *s, size_t k) {
   qp_presolve *o = s->out;
@@ -311,9 +328,9 @@ static batten_status judge_by_bounds(presolver *s, size_t k) {
   double error = (double)(s->n + 2) * DBL_EPSILON * size;
   double low = (least - error) * scale, high = (most + error) * scale;
   double beyond = crossing(s->n) * (fabs(size) * scale);
-  double minded = s->slack * scale;
-  bool above = high < o->lower[k] - fmax(beyond + crossing(s->n) * fabs(o->lower[k]), minded);
-  bool below = low > o->upper[k] + fmax(beyond + crossing(s->n) * fabs(o->upper[k]), minded);
+  double over = o->lower[k] - high, under = low - o->upper[k];
+  bool above = over > beyond + crossing(s->n) * fabs(o->lower[k]) && over > s->slack * price(s, k, 1);
+  bool below = under > beyond + crossing(s->n) * fabs(o->upper[k]) && under > s->slack * price(s, k, -1);
   if (above || below) {
     size_t from = above ? o->lower_from[k] : o->upper_from[k];
     prove(s, from, above ? o->lower_factor[k] : -o->upper_factor[k]);

@@ -2,11 +2,13 @@
  * end point to  rows'y = 0, y'sides > 0,  unknowns to a ray  H d = 0, rows d in the recession cone, g'd < 0.  Both
  * are then projected on the equations that they nearly satisfy, because whoever judges them wants these up to
  * rounding. */
+#include <float.h>
 #include <string.h>
 
 #include "interior.h"
 
-static const double NEARLY = 1e-6;  /* relative: worth the projection */
+static const double NEARLY = 1e-6; /* relative: worth the projection */
+static const double ROUNDING = 1e-15;
 static const double PROVEN = 1e-12; /* relative: rounding, with the caller's scaling undone */
 
 static double largest(size_t count, const double *v) {
@@ -106,7 +108,13 @@ bool ip_prove_unbounded(ip_newton *k, ip_polish_work *work, const double *x, dou
     for (size_t j = 0; j < s->n; j++) proof[j] += work->dx[j];
     qp_scaled_rows(s, proof, ad);
     qp_scaled_hessian(s, proof, hd);
-    if (outside(s, ad, hd) < PROVEN) break;
+    if (outside(s, ad, hd) < ROUNDING) break;
   }
-  return outside(s, ad, hd) < PROVEN * largest(s->n, proof) && slope(s, proof) < -1e-9;
+  /* an entry that is rounding has no share in a ray, but where a row has no other it is all that the judge sees */
+  top = largest(s->n, proof);
+  for (size_t j = 0; j < s->n; j++)
+    if (fabs(proof[j]) <= (double)s->n * DBL_EPSILON * top) proof[j] = 0;
+  qp_scaled_rows(s, proof, ad);
+  qp_scaled_hessian(s, proof, hd);
+  return outside(s, ad, hd) < PROVEN * top && slope(s, proof) < -1e-9;
 }

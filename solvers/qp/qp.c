@@ -126,8 +126,8 @@ static bool finished(const solver *s) { return optimal(s) || s->proof < 0 || s->
 
 /* ---- One engine ---- */
 
-/* Where a run starts: at what the caller gave, at the best so far, or with an empty working set: an engine that got
- * stuck from one may get through from the other. */
+/* Where a run starts: at what the caller gave, at the best so far, or at 0 with an empty working set: an engine that
+ * got stuck from one may get through from the other. */
 typedef enum beginning { GIVEN, BEST, COLD } beginning;
 
 static void set_start(solver *s, beginning from) {
@@ -135,11 +135,11 @@ static void set_start(solver *s, beginning from) {
   memset(s->point.y, 0, m * sizeof *s->point.y);
   memset(s->point.active, QP_FREE, m);
   memset(s->point.x, 0, n * sizeof *s->point.x);
-  s->point.have_x = from == BEST || s->o->x0;
+  s->point.have_x = from == BEST || (from == GIVEN && s->o->x0);
   if (from == BEST) {
     memcpy(s->point.x, s->best.x, n * sizeof *s->point.x);
     memcpy(s->point.active, s->best.active, m);
-  } else if (s->o->x0) {
+  } else if (s->point.have_x) {
     memcpy(s->point.x, s->o->x0, n * sizeof *s->point.x);
   }
   if (from == GIVEN && s->o->active) qp_presolve_forward(&s->pre, s->o->active, s->point.active);
@@ -274,9 +274,9 @@ static batten_status polish(solver *s, bool *refused) {
 
 /* ---- One engine after the other ---- */
 
-/* A dense engine that gets stuck, or claims what it cannot prove, is tried again with more curvature; the interior
- * point's working set, where it is not yet right, goes on in the dual engine if the caller lets engines help each
- * other. */
+/* A dense engine that gets stuck, or claims what it cannot prove, is tried again without the start that the caller
+ * gave, and with more curvature; the interior point's working set, where it is not yet right, goes on in the dual
+ * engine if the caller lets engines help each other. */
 static batten_status attempt(solver *s, batten_qp_engine engine, beginning from) {
   bool refused;
   batten_status st = run(s, engine, from);
@@ -286,7 +286,9 @@ static batten_status attempt(solver *s, batten_qp_engine engine, beginning from)
     st = run(s, BATTEN_QP_DUAL, BEST);
     return st >= 0 ? polish(s, &refused) : st;
   }
-  while (st >= 0 && !finished(s) && !at_rounding(s) && s->task.r && qp_dense_damp(&s->task)) {
+  bool given = from == GIVEN && (s->o->x0 || s->o->active);
+  while (st >= 0 && !finished(s) && !at_rounding(s) && s->task.r && (given || qp_dense_damp(&s->task))) {
+    given = false;
     st = run(s, engine, COLD);
     if (st >= 0) st = polish(s, &refused);
   }

@@ -573,6 +573,84 @@ static void test_edges(batten_context *ctx) {
   report(&t), report(&none), report(&fixed);
 }
 
+/* One engine alone, from a start of the caller. */
+static batten_status solve_alone(batten_context *ctx, batten_qp_engine engine, const batten_qp_problem *p,
+                                 const double *x0, int hand_over, batten_qp_info *info) {
+  batten_qp_options opt = batten_qp_options_default();
+  opt.engine = engine, opt.x0 = x0, opt.hand_over = hand_over;
+  return batten_qp_solve(ctx, p, &opt, NULL, NULL, info);
+}
+
+/* A start that is far off must not cost digits, nor a ray that is sought from it. */
+static void test_nonsense_start(batten_context *ctx) {
+  double a[5 * 6] = {2,  -2, 0,  1,  2,  -2, 0,  1, 1, -1, 2,  0, 2, -1, 1,
+                     -1, 0,  -1, -1, -2, 2,  -2, 0, 2, 1,  -1, 0, 1, 1,  -2},
+               b[5] = {2, 3, -3, -3, 1}, g[6] = {0}, x0[6] = {1.44043, 3, 1.89238e8, 0, 2, 0},
+               flat[6] = {1, 0, 0, 0, 0, 0};
+  batten_matrix am = batten_matrix_dense(5, 6, a);
+  batten_qp_problem p = batten_qp_problem_default(6);
+  p.a = &am, p.b = b;
+  for (int e = 0; e < 4; e++) {
+    batten_qp_info info = {0};
+    T_STATUS(solve_alone(ctx, qp_engines[e], &p, x0, 1, &info), BATTEN_OK, ctx, "");
+    x0[2] = -1e28;
+    T_STATUS(solve_alone(ctx, qp_engines[e], &p, x0, 1, &info), BATTEN_OK, ctx, "");
+    x0[2] = 1.89238e8;
+  }
+  for (size_t i = 0; i < 5; i++) a[6 * i] = 0, a[6 * i + 3] = 0;
+  memcpy(g, flat, sizeof g);
+  p.g = g;
+  x0[3] = -1e28;
+  for (int e = 0; e < 4; e++)
+    for (int hand_over = 0; hand_over < 2; hand_over++)
+      T_STATUS(solve_alone(ctx, qp_engines[e], &p, x0, hand_over, NULL), BATTEN_E_UNBOUNDED, ctx, "");
+}
+
+/* An entry that is rounding beside the others of its row stands before an unknown that is huge: the rows are not
+ * parallel. And sides that contradict each other by less than the caller minds, in the units of one of the two. */
+static void test_mixed_units(batten_context *ctx) {
+  tally units = {.what = "rows that differ in tiny entries before huge unknowns"};
+  double c[4] = {1, 0x1p-80, -1, 0x1p-80}, lower[2] = {3, 1}, h[4] = {1, 0, 0, 0x1p-160}, x[2] = {1, 0x1p81};
+  batten_matrix cm = batten_matrix_dense(2, 2, c), hm = batten_matrix_dense(2, 2, h);
+  batten_qp_problem p = batten_qp_problem_default(2);
+  p.h = &hm, p.c = &cm, p.lower = lower, p.upper = lower;
+  expect_solved(ctx, &units, 0, &p, x, 2.5, 1e-14);
+  report(&units);
+
+  tally minded = {.what = "sides that cross by less than is minded"};
+  double one[4] = {0x1p-80, 0, 1, 1}, high[2] = {0, 9}, bound[2] = {3, -5};
+  cm = batten_matrix_dense(2, 2, one);
+  p.c = &cm, p.lower = NULL, p.upper = high, p.x_lower = bound;
+  for (int e = 0; e < 4; e++) {
+    outcome *o = solve(ctx, qp_engines[e], &p);
+    qp_verdict v = qp_check(&p, o->x, o->y);
+    count(&minded, e, 0, o->status == BATTEN_OK && v.primal <= 1e-9, v.primal, batten_error(ctx));
+  }
+  report(&minded);
+}
+
+/* A limit that is met at a point that is good enough: its working set is told with it. */
+static void test_limit_at_solution(batten_context *ctx) {
+  double h[9] = {4, 0, 0, 0, 1, 0, 0, 0, 4}, g[3] = {4, 2, -2}, c[6] = {0, -2, 0, 0, 0, -1}, lower[2] = {-4, 2};
+  double x_lower[3] = {1, -INFINITY, -2}, x_upper[3] = {INFINITY, INFINITY, 0}, y[5];
+  signed char active[5];
+  batten_matrix hm = batten_matrix_dense(3, 3, h), cm = batten_matrix_dense(2, 3, c);
+  batten_qp_problem p = batten_qp_problem_default(3);
+  p.h = &hm, p.g = g, p.c = &cm, p.lower = lower, p.x_lower = x_lower, p.x_upper = x_upper;
+  size_t solved = 0;
+  for (size_t limit = 1; limit < 12; limit++) {
+    batten_qp_options opt = batten_qp_options_default();
+    opt.engine = BATTEN_QP_INTERIOR, opt.iteration_limit = limit, opt.hand_over = 0;
+    batten_qp_solution s = {.multipliers = y, .active = active};
+    if (batten_qp_solve(ctx, &p, &opt, NULL, &s, NULL) != BATTEN_OK) continue;
+    solved++;
+    for (size_t i = 0; i < 5; i++)
+      T_CHECK((fabs(y[i]) > 1e-6) == (active[i] != 0), "limit %zu: multiplier %zu %g, active %d", limit, i, y[i],
+              active[i]);
+  }
+  T_CHECK(solved > 2, "%zu limits were enough", solved);
+}
+
 int main(void) {
   batten_context *ctx = t_context(NULL, NULL, 1);
   test_edges(ctx);
@@ -586,6 +664,9 @@ int main(void) {
   test_indefinite(ctx);
   test_semidefinite(ctx);
   test_invariance(ctx);
+  test_nonsense_start(ctx);
+  test_mixed_units(ctx);
+  test_limit_at_solution(ctx);
   batten_context_free(ctx);
   return t_done();
 }

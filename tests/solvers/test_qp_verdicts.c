@@ -172,7 +172,7 @@ static void test_not_convex(batten_context *ctx, size_t count) {
 int main(void) {
   batten_context *ctx = t_context(NULL, NULL, 1);
   test_infeasible(ctx, 60);
-  test_unbounded(ctx, 60);
+  test_unbounded(ctx, 130);
   test_not_convex(ctx, 100);
   T_CHECK(batten_bytes_in_use(ctx) == 0, "all memory is given back");
   batten_context_free(ctx);
