@@ -410,9 +410,8 @@ static void direction(ip *p, double *a, double *b) {
 
 /* Until the limits are met; unless strictly, the relative tolerance will do. */
 static batten_status iterate(batten_context *ctx, ip *p, bool strictly, size_t *count) {
-  const double NEARLY = 1e-8;             /* residuals that no problem without solution reaches */
-  const double NEAR = 1e-12;              /* relative: what is left may be rounding */
-  const size_t PATIENCE = 30, LITTLE = 2; /* steps without a better point or smaller mu */
+  const double NEARLY = 1e-8;                /* residuals that no problem without solution reaches */
+  const size_t patience = strictly ? 5 : 30; /* steps without a better point or smaller mu */
   size_t idle = 0;
   double mark = INFINITY, least_mu = INFINITY; /* of the last progress worth the name */
   double a = 0, b = 0;
@@ -426,8 +425,7 @@ static batten_status iterate(batten_context *ctx, ip *p, bool strictly, size_t *
       least_mu = fmin(least_mu, p->mu);
       idle = 0;
     }
-    bool near = p->best.largest <= NEAR && p->figures.largest <= 100 * NEAR;
-    if (idle > (near ? LITTLE : PATIENCE) || !isfinite(p->figures.merit)) return BATTEN_W_ACCURACY;
+    if (idle > patience || !isfinite(p->figures.merit)) return BATTEN_W_ACCURACY;
     batten_status st = qp_limits_check(ctx, p->limits, *count, 1 - 1 / (1 + 0.1 * (double)*count));
     if (st < 0) return st;
     if (p->figures.primal > NEARLY && ip_prove_infeasible(&p->newton, &p->work, p->y, p->work.y))

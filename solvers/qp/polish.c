@@ -80,6 +80,7 @@ static size_t change(const qp_scaled *s, ip_polish_work *p, const double *ax) {
 
 ip_figures ip_polish(ip_newton *k, const qp_limits *limits, ip_polish_work *p, ip_figures before, double enough,
                      double *x, double *y, signed char *active, size_t rounds) {
+  const size_t SOME = 8;
   const qp_scaled *s = k->s;
   ip_figures best = before;
   memcpy(p->tried, active, s->m);
@@ -94,7 +95,9 @@ ip_figures ip_polish(ip_newton *k, const qp_limits *limits, ip_polish_work *p, i
       memcpy(y, p->y, s->m * sizeof *y);
       memcpy(active, p->tried, s->m);
     }
-    if (best.largest <= enough || !isfinite(f.merit) || change(s, p, p->r2) == 0) break;
+    if (best.largest <= enough || !isfinite(f.merit)) break;
+    size_t changes = change(s, p, p->r2);
+    if (changes == 0 || changes > SOME + s->m / 32) break; /* right, or too far off for this to end soon */
   }
   return best;
 }
