@@ -39,7 +39,8 @@ void qp_task_free(batten_context *ctx, qp_task *task);
 
 /* refine.c: the minimiser on the working set point->active alone, by steps of conjugate gradients on the factor, with
  * residuals in twice the working precision. *error: its relative residuals; INFINITY, and the point untouched, where
- * it breaks other rows or signs by more than rounding, or is not found. */
+ * it breaks other rows or signs by more than rounding, or is not found. Fails: E_LIMIT, E_CANCELLED, NOMEM; the point
+ * untouched. */
 batten_status qp_refine(batten_context *ctx, const qp_task *task, qp_point *point, double *error);
 
 /* digits.c: other doubles next to x [n] and y [m + n] of the caller, that meet the tolerances better; info is theirs

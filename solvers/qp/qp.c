@@ -266,6 +266,7 @@ static batten_status polish(solver *s, bool *refused) {
   set_start(s, BEST);
   memcpy(s->point.y, s->best.y, s->pre.rows.m * sizeof *s->point.y);
   st = qp_refine(s->ctx, &s->task, &s->point, &error);
+  if (st == BATTEN_E_LIMIT || st == BATTEN_E_CANCELLED) s->stop = st;
   if (st < 0) return st == BATTEN_E_NOMEM ? st : BATTEN_OK;
   *refused = !(error < INFINITY);
   if (!*refused) consider(s, s->info.engine, true);

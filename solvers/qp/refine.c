@@ -215,23 +215,27 @@ static batten_status allocate(batten_context *ctx, refinement *f) {
   return f->sum ? BATTEN_OK : BATTEN_E_NOMEM;
 }
 
-/* Goes down to the least residuals, and returns them. */
-static double descend(refinement *f) {
+/* Goes down to the least residuals: *best. Fails where a limit is met or the host cancels. */
+static batten_status descend(batten_context *ctx, refinement *f, double *best) {
   const size_t n = f->set.n, most = f->task->rho > 0 ? 40 : 6;
-  double best = INFINITY, squares = 0;
+  const double NEARLY_DONE = 0.99;
+  double squares = 0;
+  *best = INFINITY;
   for (size_t step = 0, worse = 0; step < most && worse < 3; step++) {
+    batten_status st = qp_limits_check(ctx, &f->task->limits, 0, NEARLY_DONE);
+    if (st < 0) return st;
     double error = residuals(f);
     if (!(error < INFINITY)) break;
-    worse = error < 0.5 * best ? 0 : worse + 1;
-    if (error < best) {
-      best = error;
+    worse = error < 0.5 * *best ? 0 : worse + 1;
+    if (error < *best) {
+      *best = error;
       memcpy(f->best_x, f->x, n * sizeof *f->x);
       memcpy(f->best_y, f->y, f->set.q * sizeof *f->y);
     }
     if (error <= 0) break;
     take_step(f, &squares);
   }
-  return best;
+  return BATTEN_OK;
 }
 
 batten_status qp_refine(batten_context *ctx, const qp_task *task, qp_point *point, double *error) {
@@ -239,7 +243,7 @@ batten_status qp_refine(batten_context *ctx, const qp_task *task, qp_point *poin
   size_t n = rows->n;
   refinement f = {.task = task};
   qp_dense objective = {n, task->r, task->base};
-  double *product = NULL;
+  double left, *product = NULL;
   *error = INFINITY;
   batten_status st = qp_active_new(ctx, &objective, rows, &f.set);
   if (st == BATTEN_OK) st = allocate(ctx, &f);
@@ -252,7 +256,8 @@ batten_status qp_refine(batten_context *ctx, const qp_task *task, qp_point *poin
   }
   memcpy(f.x, point->x, n * sizeof *f.x);
   for (size_t i = 0; i < f.set.q; i++) f.y[i] = point->y[f.set.member[i]];
-  double left = descend(&f);
+  st = descend(ctx, &f, &left);
+  if (st < 0) goto done;
   /* 1e-6: without a residual that small it is no minimiser, and no use */
   if (!(left < 1e-6 && signs_hold(&f) && rows_hold(&f, product))) goto done;
   *error = left;

@@ -91,7 +91,7 @@ typedef struct batten_qp_info {
   double duality_gap;        /* |primal objective - dual objective| */
   double primal_scale;       /* largest |C x|, |x| where x is bounded */
   double dual_scale;         /* largest of |A'W A x + H x|, |g - A'W b|, |C'y_rows + y_bounds| */
-  double gap_scale;          /* larger of the objectives' sizes */
+  double gap_scale;          /* largest of |x'(A'W A + H) x|, |(g - A'W b)'x|, |sum of y_i side_i| */
   size_t iterations;         /* pivots of the active set engines, steps of the interior point, over all rounds */
   size_t factorizations;     /* of the objective, of the interior point's matrix; fresh ones of the working set */
   size_t proximal_steps;     /* rounds of the proximal loop for semidefinite Hessians; 0 = not needed */
