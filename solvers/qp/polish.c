@@ -80,9 +80,9 @@ static size_t change(const qp_scaled *s, ip_polish_work *p, const double *ax) {
 
 ip_figures ip_polish(ip_newton *k, const qp_limits *limits, ip_polish_work *p, ip_figures before, double enough,
                      double *x, double *y, signed char *active, size_t rounds) {
-  const size_t SOME = 8;
   const qp_scaled *s = k->s;
   ip_figures best = before;
+  const size_t most = s->m / 4;
   memcpy(p->tried, active, s->m);
   memcpy(p->x, x, s->n * sizeof *x);
   for (size_t i = 0; i < s->m; i++) p->y[i] = active[i] ? y[i] : 0;
@@ -97,7 +97,7 @@ ip_figures ip_polish(ip_newton *k, const qp_limits *limits, ip_polish_work *p, i
     }
     if (best.largest <= enough || !isfinite(f.merit)) break;
     size_t changes = change(s, p, p->r2);
-    if (changes == 0 || changes > SOME + s->m / 32) break; /* right, or too far off for this to end soon */
+    if (changes == 0 || changes > most) break; /* right, or too far off for this to end soon */
   }
   return best;
 }
