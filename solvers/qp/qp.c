@@ -38,6 +38,7 @@ typedef struct solver {
   bool found;          /* there is a best */
   batten_status proof; /* E_INFEASIBLE, E_UNBOUNDED, E_NOT_CONVEX once proven, else BATTEN_OK */
   batten_status stop;  /* E_LIMIT, E_CANCELLED once met, else BATTEN_OK */
+  bool worn;           /* an engine met the limit that was chosen by size */
   bool settled;        /* y holds the multipliers of best, which best.y only comes near to */
   bool inexact;        /* exact was asked for and could not be had */
   double *y;           /* [m + n] multipliers of the caller; the certificate of E_INFEASIBLE */
@@ -216,6 +217,10 @@ static batten_status run(solver *s, batten_qp_engine engine, beginning from) {
     st = engine == BATTEN_QP_INTERIOR ? run_interior(s) : qp_dense_solve(s->ctx, &s->task, engine, &s->point);
   switch (st) {
     case BATTEN_E_LIMIT:
+      /* a limit of the caller ends the solve; one that was chosen by size says that this run goes round in circles */
+      s->worn = s->o->iteration_limit == 0 && batten_now() <= s->task.limits.deadline;
+      if (!s->worn) s->stop = st;
+      break;
     case BATTEN_E_CANCELLED:
       s->stop = st;
       break;
@@ -468,6 +473,11 @@ static batten_status solve(solver *s) {
     st = attempt(s, s->plan.engine[i], i == 0 ? GIVEN : COLD);
     if (st >= 0) settle(s);
   }
+  if (st >= 0 && s->worn && !finished(s))
+    s->stop = batten_fail(s->ctx, BATTEN_E_LIMIT,
+                          "opt.iteration_limit: %zu iterations, chosen by size, were not enough; "
+                          "allow more",
+                          s->task.limits.iterations);
   if (st >= 0) st = blend(s);
   if (st < 0) return st;
   s->info.not_convex_index = s->proof == BATTEN_E_NOT_CONVEX ? s->task.not_convex_index : s->n;
