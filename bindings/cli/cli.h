@@ -74,7 +74,8 @@ typedef struct cli_run {
   const struct cli_outputs *outputs; /* their staged names are told as they were given; NULL = none */
 } cli_run;
 
-/* threads 0 = all cores, memory_limit 0 = 90 % of what the machine has. False after a line on stderr. Ctrl-C cancels the library's work from here on. */
+/* threads 0 = all cores, memory_limit 0 = 90 % of what the machine has. False after a line on stderr. Ctrl-C cancels
+ * the library's work from here on. */
 bool cli_run_open(cli_run *run, unsigned threads, size_t memory_limit, bool quiet);
 void cli_run_close(cli_run *run);
 void cli_run_clear(cli_run *run); /* removes the bar, before other output */

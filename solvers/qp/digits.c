@@ -1,9 +1,10 @@
 /* Digits below the rounding of x and y. At a solution of size 1e6 and more, rounding each number to the nearest
  * double leaves residuals and a gap above 1e-9, though other doubles next to them fit better: sums can be met more
- * closely than their terms. Three steps, each kept only if the judge finds the largest residual smaller: dual
- * residual   one multiplier after the other goes to the neighbouring double if that lessens sum r_j^4 gap the
- * multiplier whose side is largest against its row takes gap / side gap             x moves along the gradient of
- * x'Px + q'x, by gap / length: tiny when there are many unknowns */
+ * closely than their terms. Three steps, each kept only if the judge finds the largest residual smaller:
+ *
+ *   dual residual  one multiplier after the other goes to the neighbouring double if that lessens sum r_j^4
+ *   gap            the multiplier whose side is largest against its row takes gap / side
+ *   gap            x moves along the gradient of x'Px + q'x, by gap / length: tiny when there are many unknowns */
 #include <float.h>
 #include <string.h>
 

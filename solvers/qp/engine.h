@@ -3,11 +3,15 @@
  *   qp.c         the driver (driver.h): check.c the caller's problem, choose.c engines, judge, try the next, then
  *   presolve.c     caller's rows and bounds -> qp_rows: unit length, merged, redundant ones left out; and back again
  *   objective.c    caller's A, b, w, H, g   -> qp_objective: gradients, triangular factor, sparse Hessian
- *   proximal.c     the engines on a strictly convex problem, or a sequence of such; refine.c the last digits
- *     dual.c primal.c (on active.c, phase1.c)   dense engines: 1/2 |R x - c|^2
- *     interior.c (on ordering.c, band.c)        sparse engine: 1/2 x'Hx + g'x
+ *   proximal.c     the dense engines on a strictly convex problem, or on a sequence of such
+ *     dual.c (pricing.c), primal.c (phase1.c, search.c), both on active.c: 1/2 |R x - c|^2
+ *   interior.c     1/2 x'Hx + g'x on sparse rows: scaled.c, newton.c, polish.c, proof.c
+ *     kkt.c          its linear systems: bordered.c and band.c, or ldl.c and degree.c; ordering.c
+ *   refine.c digits.c   the last digits on a working set, and below the rounding of x and y
  *   certify.c    residuals, certificates, rays from the caller's data alone
  *   exact.c      the blend with a strictly feasible point
+ *
+ * Inner loops, of the engines (lanes.c) and of the judge (judge_sums.c), are built once for each instruction set.
  *
  * All memory is that of qp_context(workspace): a context whose blocks stay in the workspace between solves, so code
  * below allocates and frees with batten_alloc() as everywhere. */
@@ -18,8 +22,8 @@
 #include <math.h>
 #include <stdbool.h>
 
-/* Constraints as engines see them: lower[k] <= a_k'x <= upper[k] with a_k = scale[k] * (a row of the caller, or of the
- * unit matrix) of length 1. */
+/* Constraints as engines see them: lower[k] <= a_k'x <= upper[k] with a_k = scale[k] * (a row of the caller, or of
+ * the unit matrix) of length 1. */
 typedef struct qp_rows {
   size_t n, m;             /* unknowns, constraints */
   const batten_matrix *c;  /* the caller's rows; NULL = none */
@@ -35,8 +39,8 @@ double qp_rows_dot(const qp_rows *rows, size_t k, const double *x);
 void qp_rows_add(const qp_rows *rows, size_t k, double factor, double *to);
 /* out[i] = a_{first+i}'x, i < count: one matrix-vector product where rows are dense */
 void qp_rows_times(const qp_rows *rows, size_t first, size_t count, const double *x, double *out);
-/* Entries of a_k: how many; unscaled values; their columns, or NULL when the row is dense (entry j is column j). A bound
- * gives one entry with value 1. */
+/* Entries of a_k: how many; unscaled values; their columns, or NULL when the row is dense (entry j is column j). A
+ * bound gives one entry with value 1. */
 size_t qp_rows_entries(const qp_rows *rows, size_t k, const double **values, const uint32_t **columns);
 
 /* Entries of all constraints. */
@@ -82,8 +86,8 @@ typedef struct qp_point {
 } qp_point;
 
 /* Engines. Status: BATTEN_OK optimal; E_INFEASIBLE (y proposed; certify.c decides); E_UNBOUNDED (interior: ray
- * proposed); E_LIMIT, E_CANCELLED with have_x telling whether x is feasible all the same; W_ACCURACY stuck: the point is
- * the best found; NOMEM. */
+ * proposed); E_LIMIT, E_CANCELLED with have_x telling whether x is feasible all the same; W_ACCURACY stuck: the point
+ * is the best found; NOMEM. */
 batten_status qp_dual(batten_context *ctx, const qp_dense *objective, const qp_rows *rows, const qp_limits *limits,
                       qp_point *point);
 batten_status qp_primal(batten_context *ctx, const qp_dense *objective, const qp_rows *rows, const qp_limits *limits,
@@ -91,8 +95,7 @@ batten_status qp_primal(batten_context *ctx, const qp_dense *objective, const qp
 batten_status qp_interior(batten_context *ctx, const qp_sparse *objective, const qp_rows *rows, const qp_limits *limits,
                           qp_point *point);
 
-/* Bytes that they will hold, and an estimate of their time in floating point operations. factor_entries: of the interior
- * point's banded matrix, as ordering.c finds it. */
+/* Bytes that they will hold, and an estimate of their time in floating point operations. */
 typedef struct qp_cost {
   size_t bytes;
   double flops;
@@ -101,8 +104,8 @@ qp_cost qp_dual_cost(const qp_rows *rows);
 qp_cost qp_primal_cost(const qp_rows *rows);
 batten_status qp_interior_cost(batten_context *ctx, const batten_matrix *h, const qp_rows *rows, qp_cost *out);
 
-/* The workspace's inside: a context that keeps freed blocks for the next solve. Progress, threads and limits are those
- * of the outer context. */
+/* The workspace's inside: a context that keeps freed blocks for the next solve. Progress, threads and limits are
+ * those of the outer context. */
 batten_context *qp_context(batten_qp_workspace *workspace);
 /* The caller's context that it was made with. */
 batten_context *qp_outer_context(batten_qp_workspace *workspace);

@@ -12,32 +12,11 @@
 #include "active.h"
 #include "driver.h"
 #include "matrix_row.h"
+#include "twice.h"
 
-/* ---- Twice the working precision [Ogita, Rump, Oishi 2005] ---- */
-
-typedef struct twice {
-  double high, low;
-} twice;
-
-static inline void twice_add(twice *s, double v) {
-  double sum = s->high + v, part = sum - s->high;
-  s->low += (s->high - (sum - part)) + (v - part);
-  s->high = sum;
-}
-
-/* s += a b; the product's error by Dekker's splitting. */
-static inline void twice_add_product(twice *s, double a, double b) {
-  const double SPLIT = 0x1p27 + 1;
-  double p = a * b, ca = SPLIT * a, cb = SPLIT * b;
-  double a1 = ca - (ca - a), a2 = a - a1, b1 = cb - (cb - b), b2 = b - b1;
-  double error = a2 * b2 - (((p - a1 * b1) - a2 * b1) - a1 * b2);
-  twice_add(s, p);
-  if (isfinite(error)) s->low += error; /* not where numbers are too large to be split */
-}
-
-static twice row_product(const qp_matrix_row *row, const double *x) {
-  twice sum = {0, 0};
-  for (size_t e = 0; e < row->count; e++) twice_add_product(&sum, row->values[e], x[qp_row_column(row, e)]);
+static qp_twice row_product(const qp_matrix_row *row, const double *x) {
+  qp_twice sum = {0, 0};
+  for (size_t e = 0; e < row->count; e++) qp_twice_add_product(&sum, row->values[e], x[qp_row_column(row, e)]);
   return sum;
 }
 
@@ -46,7 +25,7 @@ static twice row_product(const qp_matrix_row *row, const double *x) {
 typedef struct refinement {
   const qp_task *task;
   qp_active set;
-  twice *sum;              /* [n] */
+  qp_twice *sum;              /* [n] */
   double *x, *y;           /* [n], [n] of members: where we are */
   double *best_x, *best_y; /* where the residuals were least */
   double *dual, *primal;   /* [n] r_d, [n] r_p of members */
@@ -57,20 +36,20 @@ typedef struct refinement {
 static void add_gradient(refinement *f) {
   const batten_qp_problem *p = f->task->problem;
   size_t n = p->n;
-  for (size_t j = 0; j < n; j++) f->sum[j] = (twice){p->g ? p->g[j] : 0, 0};
+  for (size_t j = 0; j < n; j++) f->sum[j] = (qp_twice){p->g ? p->g[j] : 0, 0};
   for (size_t i = 0; p->h && i < n; i++) {
     qp_matrix_row row = qp_row_of(p->h, i);
-    twice product = row_product(&row, f->x);
-    twice_add(&f->sum[i], product.high);
+    qp_twice product = row_product(&row, f->x);
+    qp_twice_add(&f->sum[i], product.high);
     f->sum[i].low += product.low;
   }
   for (size_t i = 0; p->a && i < p->a->rows; i++) {
     qp_matrix_row row = qp_row_of(p->a, i);
-    twice residual = row_product(&row, f->x);
-    if (p->b) twice_add(&residual, -p->b[i]);
+    qp_twice residual = row_product(&row, f->x);
+    if (p->b) qp_twice_add(&residual, -p->b[i]);
     double weighted = (p->weights ? p->weights[i] : 1) * (residual.high + residual.low);
     for (size_t e = 0; e < row.count; e++)
-      twice_add_product(&f->sum[qp_row_column(&row, e)], row.values[e], weighted);
+      qp_twice_add_product(&f->sum[qp_row_column(&row, e)], row.values[e], weighted);
   }
 }
 
@@ -86,11 +65,11 @@ static double residuals(refinement *f) {
     const uint32_t *columns;
     size_t k = f->set.member[i], count = qp_rows_entries(rows, k, &values, &columns);
     double factor = -f->y[i] * rows->scale[k], bound = qp_active_bound(&f->set, i);
-    twice product = {0, 0};
+    qp_twice product = {0, 0};
     for (size_t e = 0; e < count; e++) {
       size_t j = columns ? columns[e] : e;
-      twice_add_product(&f->sum[j], values[e], factor);
-      twice_add_product(&product, values[e], f->x[j]);
+      qp_twice_add_product(&f->sum[j], values[e], factor);
+      qp_twice_add_product(&product, values[e], f->x[j]);
       dual_scale = fmax(dual_scale, fabs(values[e] * factor));
       primal_scale = fmax(primal_scale, rows->scale[k] * fabs(values[e] * f->x[j]));
     }

@@ -1,6 +1,6 @@
-/* The workspace of quadratic programs: a context of its own whose memory hooks keep freed blocks for the next solve, so
- * that everything below allocates in the usual way, LAPACK's wrappers included, and a solve that takes the same sizes in
- * the same order takes nothing from the host. */
+/* The workspace of quadratic programs: a context of its own whose memory hooks keep freed blocks for the next solve,
+ * so that everything below allocates in the usual way, LAPACK's wrappers included, and a solve that takes the same
+ * sizes in the same order takes nothing from the host. */
 #include "base/checked.h"
 #include "base/context.h"
 #include "engine.h"
@@ -25,8 +25,9 @@ static void drop_free_blocks(batten_qp_workspace *w) {
   }
 }
 
-/* Sizes come in classes, four to eight to an octave, from 8 pages up in pages. A kept block serves requests of its own class alone:
- * were it lent to smaller ones, the same solve done again could find it taken where it was free before. */
+/* Sizes come in classes, four to eight to an octave, from 8 pages up in pages. A kept block serves requests of its
+ * own class alone: were it lent to smaller ones, the same solve done again could find it taken where it was free
+ * before. */
 static bool class_of(size_t bytes, size_t *size) {
   const size_t PAGE = 4096;
   size_t step = HEADER;

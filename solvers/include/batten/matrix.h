@@ -9,8 +9,8 @@
 extern "C" {
 #endif
 
-/* rows x columns. Either dense is given, or starts, indices and values. A matrix without rows or columns needs none of
- * them. The arrays are the caller's. */
+/* rows x columns. Either dense is given, or starts, indices and values. A matrix without rows or columns needs none
+ * of them. The arrays are the caller's. */
 typedef struct batten_matrix {
   size_t rows, columns;
   const double *dense;     /* [rows][columns] row-major */

@@ -69,10 +69,9 @@ typedef struct batten_qp_options {
 } batten_qp_options;
 BATTEN_API batten_qp_options batten_qp_options_default(void);
 
-/* Where the result goes: the caller's arrays, each may be NULL. active, and multipliers and certificate, have the rows
- * first, then the bounds of x.
- * x, multipliers, active are written by BATTEN_OK, W_ACCURACY and W_STOPPED; certificate by E_INFEASIBLE; ray by
- * E_UNBOUNDED and E_NOT_CONVEX; nothing else is touched. */
+/* Where the result goes: the caller's arrays, each may be NULL. active, and multipliers and certificate, have the
+ * rows first, then the bounds of x. x, multipliers, active are written by BATTEN_OK, W_ACCURACY and W_STOPPED;
+ * certificate by E_INFEASIBLE; ray by E_UNBOUNDED and E_NOT_CONVEX; nothing else is touched. */
 typedef struct batten_qp_solution {
   double *x;           /* [n] */
   double *multipliers; /* [m + n] y: gradient of the objective = C'y_rows + y_bounds; > 0 at a lower, < 0 at an upper side */
@@ -121,15 +120,15 @@ BATTEN_API void batten_qp_workspace_free(batten_qp_workspace *workspace);
  *   BATTEN_E_NOT_CONVEX H is not positive semidefinite; proven by ray and not_convex_index
  *   BATTEN_E_LIMIT      a limit was met before a feasible point was known, or no engine found a point
  * Other failures: INVALID, TOO_LARGE, NOMEM, CANCELLED (no feasible point was known).
- * Cost: dense engines O(k n^2 + n^3) to factor, then about 2 m n for a pass over all rows (some five to ten passes) and
- * 10 n^2 (dual) to 26 n^2 (primal) for a pivot; interior point: about 25 steps of n * bandwidth^2, or of a sparse factor.
- * Bytes: batten_qp_bytes. Threads: one call per context and workspace at a time; inputs are only read. */
+ * Cost: dense engines O(k n^2 + n^3) to factor, then about 2 m n for a pass over all rows (some five to ten passes),
+ * and 10 n^2 (dual) to 26 n^2 (primal) for a pivot; interior point: about 25 steps of n * bandwidth^2, or of a sparse
+ * factor. Bytes: batten_qp_bytes. Threads: one call per context and workspace at a time; inputs are only read. */
 BATTEN_API batten_status batten_qp_solve(batten_context *ctx, const batten_qp_problem *problem,
                                          const batten_qp_options *opt, batten_qp_workspace *workspace,
                                          batten_qp_solution *solution, batten_qp_info *info);
 
-/* Bytes that solving will hold at most, and the engine that AUTO chooses (engine may be NULL). Fails: INVALID, TOO_LARGE,
- * NOMEM (it orders the unknowns). */
+/* Bytes that solving will hold at most, and the engine that AUTO chooses (engine may be NULL). Fails: INVALID,
+ * TOO_LARGE, NOMEM (it orders the unknowns). */
 BATTEN_API batten_status batten_qp_bytes(batten_context *ctx, const batten_qp_problem *problem,
                                          const batten_qp_options *opt, size_t *bytes, batten_qp_engine *engine);
 

@@ -88,31 +88,31 @@ typedef struct batten_qp_file {
  *   .json            batten "qp"
  *   .mat             MATLAB level 5 with P q r l u A, as the Maros-Meszaros problems are handed on; where the last n rows
  *                    of A are the identity, they are the bounds of x
- * Bounds and sides of size 9e19 and more in QPS and MATLAB files are none (they mean 1e20, some less a constant). Free
- * with batten_qp_file_free. Fails: IO, FORMAT, INVALID (unknown extension: lists the known), NOMEM, TOO_LARGE, CANCELLED;
- * *out untouched then. While a JSON document is parsed, its tree is in memory that is not the context's. */
+ * Bounds and sides of size 9e19 and more in QPS and MATLAB files are none (they mean 1e20, some less a constant).
+ * Free with batten_qp_file_free. Fails: IO, FORMAT, INVALID (unknown extension: lists the known), NOMEM, TOO_LARGE,
+ * CANCELLED; *out untouched then. While a JSON document is parsed, its tree is in memory that is not the context's. */
 BATTEN_API batten_status batten_read_qp(batten_context *ctx, const char *path, batten_qp_file *out);
 
 /* Frees what batten_read_qp made; a file that the caller has put together (memory = NULL) is only emptied. */
 BATTEN_API void batten_qp_file_free(batten_context *ctx, batten_qp_file *file);
 
 /* .json {"batten": "qp", "version": 1, ...}, which reads back to the same bits, or .qps .sif .mps (free columns,
- * minimise; least squares are refused, x0 is left out, blanks in names become _; the second side of a row that has two
- * is written as their distance, which may round). Names, name and x0 may be NULL, memory is not looked at.
- * Fails: IO, INVALID, TOO_LARGE, NOMEM; what stood under the name is then as it was. */
+ * minimise; least squares are refused, x0 is left out, blanks in names become _; the second side of a row that has
+ * two is written as their distance, which may round). Names, name and x0 may be NULL, memory is not looked at. Fails:
+ * IO, INVALID, TOO_LARGE, NOMEM; what stood under the name is then as it was. */
 BATTEN_API batten_status batten_write_qp(batten_context *ctx, const batten_qp_file *file, const char *path);
 
-/* .json {"batten": "qp_solution", "version": 1, "status": WORD, "x", "multipliers", "active"} (or "certificate", or "ray",
- * as the status has it), or .csv of x: NAME,VALUE a line, x1, x2, ... without names. n and m are of file->problem; arrays
- * of solution that are NULL are left out. WORD: optimal, inaccurate, stopped, infeasible, unbounded, not convex, limit.
- * Fails as batten_write_qp. */
+/* .json {"batten": "qp_solution", "version": 1, "status": WORD, "x", "multipliers", "active"} (or "certificate", or
+ * "ray", as the status has it), or .csv of x: NAME,VALUE a line, x1, x2, ... without names. n and m are of
+ * file->problem; arrays of solution that are NULL are left out. WORD: optimal, inaccurate, stopped, infeasible,
+ * unbounded, not convex, limit. Fails as batten_write_qp. */
 BATTEN_API batten_status batten_write_qp_solution(batten_context *ctx, const batten_qp_file *file, batten_status status,
                                                   const batten_qp_solution *solution, const char *path);
 
-/* x, multipliers and active of a .json that batten_write_qp_solution wrote (also .gz), to start from (opt.x0, opt.active)
- * or to look at: each into the caller's array, [n] and [m + n] of file->problem, where solution has one; the file must
- * have that member then. certificate and ray are not looked at.
- * Fails: IO, FORMAT (other sizes; no x, as there was no solution), INVALID, NOMEM; the arrays are as they were then. */
+/* x, multipliers and active of a .json that batten_write_qp_solution wrote (also .gz), to start from (opt.x0,
+ * opt.active) or to look at: each into the caller's array, [n] and [m + n] of file->problem, where solution has one;
+ * the file must have that member then. certificate and ray are not looked at. Fails: IO, FORMAT (other sizes; no x,
+ * as there was no solution), INVALID, NOMEM; the arrays are as they were then. */
 BATTEN_API batten_status batten_read_qp_solution(batten_context *ctx, const batten_qp_file *file, const char *path,
                                                  batten_qp_solution *solution);
 
