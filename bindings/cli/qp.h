@@ -35,7 +35,6 @@ typedef struct qp_work {
 
 void qp_count(const batten_qp_problem *p, qp_counts *out);
 const char *qp_engine_name(batten_qp_engine engine);
-const char *qp_status_word(batten_status status);
 
 /* Is the status one that proves or says something about the problem, so that figures are there? */
 bool qp_has_figures(batten_status status);

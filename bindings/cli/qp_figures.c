@@ -123,27 +123,6 @@ static const char *engine_in_words(batten_qp_engine engine) {
   }
 }
 
-const char *qp_status_word(batten_status status) {
-  switch (status) {
-    case BATTEN_OK:
-      return "optimal";
-    case BATTEN_W_ACCURACY:
-      return "inaccurate";
-    case BATTEN_W_STOPPED:
-      return "stopped";
-    case BATTEN_E_INFEASIBLE:
-      return "infeasible";
-    case BATTEN_E_UNBOUNDED:
-      return "unbounded";
-    case BATTEN_E_NOT_CONVEX:
-      return "not convex";
-    case BATTEN_E_LIMIT:
-      return "limit";
-    default:
-      return "failed";
-  }
-}
-
 bool qp_has_figures(batten_status status) {
   return status >= 0 || status == BATTEN_E_INFEASIBLE || status == BATTEN_E_UNBOUNDED ||
          status == BATTEN_E_NOT_CONVEX || status == BATTEN_E_LIMIT;
@@ -156,7 +135,7 @@ void qp_report(const qp_work *w, cli_report *r) {
   bool solved = w->status >= 0;
   cli_report_text(r, "command", "qp");
   cli_report_common(r, &w->run, w->status);
-  cli_report_text(r, "status", qp_status_word(w->status));
+  cli_report_text(r, "status", batten_qp_status_word(w->status));
   cli_report_text(r, "input", w->request->common.input);
   qp_report_counts(&w->counts, &w->file, r);
   cli_report_text(r, "engine", qp_engine_name(i->engine));
@@ -188,7 +167,7 @@ void qp_report(const qp_work *w, cli_report *r) {
 void qp_summary(const qp_work *w) {
   const batten_qp_info *i = &w->info;
   qp_print_counts(&w->counts, &w->file);
-  cli_line("status", "%s", qp_status_word(w->status));
+  cli_line("status", "%s", batten_qp_status_word(w->status));
   cli_line("engine", "%s, %zu iteration%s, %zu factorization%s%s", engine_in_words(i->engine), i->iterations,
            plural(i->iterations, "", "s"), i->factorizations, plural(i->factorizations, "", "s"),
            i->proximal_steps ? ", proximal" : "");

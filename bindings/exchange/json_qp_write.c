@@ -117,7 +117,7 @@ void bx_write_json_qp(bx_writer *w, const batten_qp_file *file) {
 
 /* ---- solutions ------------------------------------------------------------------------------------- */
 
-static const char *status_word(batten_status status) {
+const char *batten_qp_status_word(batten_status status) {
   switch (status) {
     case BATTEN_OK:
       return "optimal";
@@ -140,7 +140,7 @@ static const char *status_word(batten_status status) {
 
 void bx_write_json_qp_solution(bx_writer *w, size_t n, size_t m, batten_status status,
                                const batten_qp_solution *solution) {
-  bx_print(w, "{\"batten\": \"qp_solution\", \"version\": 1,\n\"status\": \"%s\"", status_word(status));
+  bx_print(w, "{\"batten\": \"qp_solution\", \"version\": 1,\n\"status\": \"%s\"", batten_qp_status_word(status));
   if (status >= 0) {
     put_vector(w, "x", solution->x, n);
     put_vector(w, "multipliers", solution->multipliers, m + n);

@@ -71,21 +71,6 @@ void qp_objective_gradient(const qp_objective *o, const double *x, double *gradi
   add_transposed(p->a, o->residual, gradient);
 }
 
-double qp_objective_value(const qp_objective *o, const double *x) {
-  const batten_qp_problem *p = o->problem;
-  double squares = 0, energy = 0, linear = 0;
-  residual_at(o, x);
-  for (size_t i = 0; i < o->k; i++) squares += weight_of(p, i) * o->residual[i] * o->residual[i];
-  for (size_t i = 0; p->h && i < o->n; i++) {
-    qp_matrix_row row = qp_row_of(p->h, i);
-    double sum = 0;
-    for (size_t e = 0; e < row.count; e++) sum += row.values[e] * x[qp_row_column(&row, e)];
-    energy += x[i] * sum;
-  }
-  for (size_t j = 0; p->g && j < o->n; j++) linear += p->g[j] * x[j];
-  return 0.5 * squares + 0.5 * energy + linear;
-}
-
 /* ---- Metric ---- */
 
 /* unit [n] := the power of two that brings the largest |W^1/2 A| of each column to about 1. */

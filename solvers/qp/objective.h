@@ -16,9 +16,8 @@ typedef struct qp_objective {
 batten_status qp_objective_new(batten_context *ctx, const batten_qp_problem *problem, qp_objective *out);
 void qp_objective_free(batten_context *ctx, qp_objective *o);
 
-/* gradient [n] at x, and the value without the constant. */
+/* gradient [n] at x. */
 void qp_objective_gradient(const qp_objective *o, const double *x, double *gradient);
-double qp_objective_value(const qp_objective *o, const double *x);
 
 /* r [n][n] column-major, diagonal > 0: R'R = P + rho D^2. By QR of [W^1/2 A; U; rho^1/2 D] where there is A (U'U = H
  * by pivoted Cholesky), else by Cholesky of H + rho D^2. base [n]: the c of rho's center 0, so that 1/2 |Rx - base|^2

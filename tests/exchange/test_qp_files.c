@@ -595,6 +595,23 @@ static void test_speed(batten_context *ctx, scratch *folder) {
   batten_qp_file_free(ctx, &back);
 }
 
+static void test_status_words(void) {
+  static const struct {
+    batten_status status;
+    const char *word;
+  } words[] = {{BATTEN_OK, "optimal"},
+               {BATTEN_W_ACCURACY, "inaccurate"},
+               {BATTEN_W_STOPPED, "stopped"},
+               {BATTEN_E_INFEASIBLE, "infeasible"},
+               {BATTEN_E_UNBOUNDED, "unbounded"},
+               {BATTEN_E_NOT_CONVEX, "not convex"},
+               {BATTEN_E_LIMIT, "limit"},
+               {BATTEN_E_NOMEM, "BATTEN_E_NOMEM"}};
+  for (size_t i = 0; i < sizeof words / sizeof *words; i++)
+    T_CHECK(strcmp(batten_qp_status_word(words[i].status), words[i].word) == 0, "%s is told as '%s'",
+            batten_status_name(words[i].status), words[i].word);
+}
+
 int main(void) {
   batten_context *ctx = t_context(NULL, NULL, 1);
   scratch folder;
@@ -614,5 +631,6 @@ int main(void) {
   T_CHECK(batten_bytes_in_use(ctx) == 0, "no memory is left");
   batten_context_free(ctx);
   scratch_close(&folder);
+  test_status_words();
   return t_done();
 }

@@ -109,6 +109,10 @@ BATTEN_API batten_status batten_write_qp(batten_context *ctx, const batten_qp_fi
 BATTEN_API batten_status batten_write_qp_solution(batten_context *ctx, const batten_qp_file *file, batten_status status,
                                                   const batten_qp_solution *solution, const char *path);
 
+/* The word that solutions and reports have for what batten_qp_solve returned: those listed above, or the status' own
+ * name where it is none of them. Never NULL. */
+BATTEN_API const char *batten_qp_status_word(batten_status status);
+
 /* x, multipliers and active of a .json that batten_write_qp_solution wrote (also .gz), to start from (opt.x0,
  * opt.active) or to look at: each into the caller's array, [n] and [m + n] of file->problem, where solution has one;
  * the file must have that member then. certificate and ray are not looked at. Fails: IO, FORMAT (other sizes; no x,
