@@ -9,6 +9,7 @@
 #include <batten/lsq.h>
 #include <batten/matrix.h>
 #include <batten/mesh.h>
+#include <batten/network.h>
 #include <batten/qp.h>
 #include <batten/saddle.h>
 #include <batten/solid.h>

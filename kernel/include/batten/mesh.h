@@ -64,6 +64,67 @@ BATTEN_API batten_status batten_mesh_measure(batten_context *ctx, const batten_m
  * meshes; on the context's threads. Fails: INVALID, NOMEM. */
 BATTEN_API batten_status batten_mesh_self_intersections(batten_context *ctx, const batten_mesh *mesh, size_t *pairs);
 
+/* ---- defects and repair -------------------------------------------------------------------------- */
+
+/* How many there are of what stands between a mesh and an oriented manifold, and the first of each (SIZE_MAX, or
+ * UINT32_MAX, when there is none). */
+typedef struct batten_mesh_defects {
+  size_t isolated_vertices, isolated_vertex;
+  size_t duplicate_vertices; /* at the place of an earlier one, both in use */
+  uint32_t duplicate_vertex[2];
+  size_t degenerate_triangles, degenerate_triangle;  /* a corner twice, or the corners on one line to rounding */
+  size_t duplicate_triangles, duplicate_triangle[2]; /* the same three corners */
+  size_t nonmanifold_edges;                          /* in more than two triangles */
+  uint32_t nonmanifold_edge[2];                      /* its ends, and: */
+  size_t nonmanifold_triangle[3];                    /* three of the triangles */
+  size_t flipped_edges;                              /* passed the same way by both of their triangles */
+  uint32_t flipped_edge[2];
+  size_t flipped_triangle[2];
+  size_t nonmanifold_vertices, nonmanifold_vertex; /* whose triangles fall apart into more than one fan */
+} batten_mesh_defects;
+/* Time O(V + F) in the mean. Fails: INVALID, NOMEM. */
+BATTEN_API batten_status batten_mesh_find_defects(batten_context *ctx, const batten_mesh *mesh,
+                                                  batten_mesh_defects *out);
+
+typedef struct batten_mesh_repair_options {
+  size_t struct_size;
+  double weld_radius; /* vertices nearer than this become one (the first), >= 0, caller's unit. Default 0: those at
+                         the same place. Negative: no welding */
+  int orient;         /* non-zero: triangles are turned so that neighbours agree and closed parts enclose a positive
+                         volume; parts that have no orientation (a Moebius strip) fail with INVALID. Default 1. */
+  int split; /* non-zero: vertices whose triangles fall apart into fans become one for each fan. Default 1. */
+} batten_mesh_repair_options;
+BATTEN_API batten_mesh_repair_options batten_mesh_repair_options_default(void);
+typedef struct batten_mesh_repair_info {
+  size_t welded_vertices, split_vertices, removed_vertices; /* removed: isolated */
+  size_t removed_triangles;                                 /* degenerate or duplicate */
+  size_t turned_triangles;
+} batten_mesh_repair_info;
+/* A mesh without the defects that can be mended; edges of more than two triangles cannot (INVALID, names the edge).
+ * Vertices and triangles that stay keep their order. Fields are taken along. info may be NULL. Fails: INVALID, NOMEM.
+ */
+BATTEN_API batten_status batten_mesh_repair(batten_context *ctx, const batten_mesh *mesh,
+                                            const batten_mesh_repair_options *opt, batten_mesh **out,
+                                            batten_mesh_repair_info *info);
+
+/* ---- noise and size ------------------------------------------------------------------------------- */
+
+/* Smoothing of noisy scans: minimises |x - x0|^2 + lambda |L x|^2 over the vertices, L the umbrella operator of the
+ * triangles (of the boundary polyline at boundaries), with lambda such that the vertices move by `noise` in the root
+ * mean square: the standard deviation of the noise along all three axes, caller's unit, > 0. *lambda may be NULL.
+ * BATTEN_W_ACCURACY: even a flat mesh would not move that far. Fields are kept as they are. Progress phase "smooth".
+ * Fails: INVALID, NOMEM, CANCELLED. */
+BATTEN_API batten_status batten_mesh_smooth(batten_context *ctx, const batten_mesh *mesh, double noise,
+                                            batten_mesh **out, double *lambda);
+
+/* Fewer triangles: edges are collapsed in the order of their quadric error [Garland, Heckbert 1997] until `triangles`
+ * are left, but never where that would fold a triangle, pinch the surface or change its topology; boundaries keep
+ * their shape. Fields are dropped. *distance_max (may be NULL) is the square root of the largest quadric error.
+ * BATTEN_W_ACCURACY: no further edge may go. Progress phase "decimate". Fails: INVALID (also: not an oriented
+ * manifold), NOMEM, CANCELLED. */
+BATTEN_API batten_status batten_mesh_decimate(batten_context *ctx, const batten_mesh *mesh, size_t triangles,
+                                              batten_mesh **out, double *distance_max);
+
 /* ---- the surface f = 0 -------------------------------------------------------------------------- */
 
 typedef struct batten_polygonize_options {
