@@ -7,6 +7,7 @@
 
 #include "base/checked.h"
 #include "mesh_inner.h"
+#include "sets.h"
 
 #include <string.h>
 
@@ -19,16 +20,15 @@ static uint32_t higher_end(const uint32_t *triangles, uint32_t h) {
   return a < b ? b : a;
 }
 
-/* out = in sorted by end(triangles, h), equal ones in their order; in NULL = 0, 1, ... start [vertex_count + 1]. */
-static void counting_sort(size_t vertex_count, size_t half_edges, const uint32_t *triangles,
-                          uint32_t (*end)(const uint32_t *, uint32_t), const uint32_t *in, uint32_t *start,
-                          uint32_t *out) {
-  memset(start, 0, (vertex_count + 1) * sizeof *start);
-  for (uint32_t h = 0; h < half_edges; h++) start[end(triangles, h) + 1]++;
-  for (size_t v = 0; v < vertex_count; v++) start[v + 1] += start[v];
-  for (uint32_t i = 0; i < half_edges; i++) {
-    uint32_t h = in ? in[i] : i;
-    out[start[end(triangles, h)]++] = h;
+void batten_mesh_counting_sort(size_t key_count, size_t count, const uint32_t *triangles,
+                               uint32_t (*key)(const uint32_t *, uint32_t), const uint32_t *in, uint32_t *start,
+                               uint32_t *out) {
+  memset(start, 0, (key_count + 1) * sizeof *start);
+  for (uint32_t i = 0; i < count; i++) start[key(triangles, i) + 1]++;
+  for (size_t v = 0; v < key_count; v++) start[v + 1] += start[v];
+  for (uint32_t i = 0; i < count; i++) {
+    uint32_t item = in ? in[i] : i;
+    out[start[key(triangles, item)]++] = item;
   }
 }
 
@@ -38,31 +38,13 @@ batten_status batten_mesh_sort_edges(batten_context *ctx, size_t vertex_count, s
   uint32_t *start = batten_alloc_array(ctx, vertex_count + 1, sizeof *start);
   uint32_t *by_higher = start ? batten_alloc_array(ctx, half_edges, sizeof *by_higher) : NULL;
   if (by_higher) {
-    counting_sort(vertex_count, half_edges, triangles, higher_end, NULL, start, by_higher);
-    counting_sort(vertex_count, half_edges, triangles, lower_end, by_higher, start, order);
+    batten_mesh_counting_sort(vertex_count, half_edges, triangles, higher_end, NULL, start, by_higher);
+    batten_mesh_counting_sort(vertex_count, half_edges, triangles, lower_end, by_higher, start, order);
   }
   batten_status st = by_higher ? BATTEN_OK : BATTEN_E_NOMEM;
   batten_free(ctx, by_higher);
   batten_free(ctx, start);
   return st;
-}
-
-/* ---- disjoint sets ------------------------------------------------------------------------------ */
-
-static uint32_t find(uint32_t *parent, uint32_t i) {
-  while (parent[i] != i) {
-    parent[i] = parent[parent[i]];
-    i = parent[i];
-  }
-  return i;
-}
-
-/* The lower root stays root, so that the outcome does not depend on the order of the unions. */
-static void join(uint32_t *parent, uint32_t i, uint32_t j) {
-  i = find(parent, i);
-  j = find(parent, j);
-  if (i < j) parent[j] = i;
-  if (j < i) parent[i] = j;
 }
 
 static size_t count_roots(size_t count, const uint32_t *parent) {
@@ -98,9 +80,9 @@ static void join_edge(const uint32_t *triangles, const uint32_t *run, size_t cou
   size_t along = 1; /* half-edges that run the same way as the first */
   for (size_t i = 1; i < count; i++) {
     along += triangles[run[i]] == a;
-    join(s->triangle, run[0] / 3, run[i] / 3);
-    join(s->corner, corner_at(triangles, run[0], a), corner_at(triangles, run[i], a));
-    join(s->corner, corner_at(triangles, run[0], b), corner_at(triangles, run[i], b));
+    sets_join(s->triangle, run[0] / 3, run[i] / 3);
+    sets_join(s->corner, corner_at(triangles, run[0], a), corner_at(triangles, run[i], a));
+    sets_join(s->corner, corner_at(triangles, run[0], b), corner_at(triangles, run[i], b));
   }
   if (count > 1 && 2 * along != count) topology->oriented = 0;
 }
@@ -110,11 +92,11 @@ static void join_loops(const uint32_t *triangles, size_t half_edges, scratch *s)
     if (s->loop[h] == MESH_NONE) continue;
     uint32_t ends[2] = {h, mesh_next(h)};
     for (int e = 0; e < 2; e++) {
-      uint32_t fan = find(s->corner, ends[e]);
+      uint32_t fan = sets_find(s->corner, ends[e]);
       if (s->fan_entry[fan] == MESH_NONE)
         s->fan_entry[fan] = h;
       else
-        join(s->loop, s->fan_entry[fan], h);
+        sets_join(s->loop, s->fan_entry[fan], h);
     }
   }
   (void)triangles;
@@ -146,11 +128,9 @@ batten_status batten_mesh_find_topology(batten_context *ctx, size_t vertex_count
     goto done;
   st = batten_mesh_sort_edges(ctx, vertex_count, triangle_count, triangles, s.order);
   if (st < 0) goto done;
-  for (uint32_t i = 0; i < triangle_count; i++) s.triangle[i] = i;
-  for (uint32_t h = 0; h < half_edges; h++) {
-    s.corner[h] = h;
-    s.loop[h] = s.fan_entry[h] = MESH_NONE;
-  }
+  sets_start(triangle_count, s.triangle);
+  sets_start(half_edges, s.corner);
+  for (uint32_t h = 0; h < half_edges; h++) s.loop[h] = s.fan_entry[h] = MESH_NONE;
   for (size_t i = 0, n; i < half_edges; i += n) {
     uint32_t low = lower_end(triangles, s.order[i]), high = higher_end(triangles, s.order[i]);
     n = 1;
