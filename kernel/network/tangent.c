@@ -1,0 +1,212 @@
+/* Local parameters of edges [Kolb, Pottmann, Seidel 1995, section 3.1]: direction and length of the derivative that a
+ * curve has at its ends before the surface's slope is added.
+ *
+ * L3 and L4 are lengths 3 l of the derivatives of a cubic from V_i to V_j with unit tangents d_i, d_j (outgoing) and
+ * given normal curvatures k_i, k_j. Its second derivative at V_i is 6 (E + l_j d_j - 2 l_i d_i), the square of its
+ * first 9 l_i^2; times the normal w_i, which is orthogonal to d_i, and likewise at V_j:
+ *   w_i . (E + l_j d_j) = 1.5 k_i l_i^2,    w_j . (-E + l_i d_i) = 1.5 k_j l_j^2
+ * In a plane these are the equations of [de Boor, Hollig, Sabin 1987], the curve's curvature there being k / (N . w)
+ * by Meusnier's theorem. */
+#include "network/fan.h"
+
+#include <string.h>
+
+/* Below this part of its length a vector has no direction left. */
+static const double DIRECTION_MIN = 1e-6;
+/* An arc turns by twice this at most: longer ones would be loops. */
+static const double ARC_ANGLE_MAX = 2.6;
+
+/* Unit vector of the part of a that is orthogonal to the unit normal w. */
+static bool project(const double *a, const double *w, double *out) {
+  double part = vec_dot(a, w), length = vec_norm(a);
+  for (int k = 0; k < 3; k++) out[k] = a[k] - part * w[k];
+  return vec_norm(out) > DIRECTION_MIN * length && vec_normalize(out);
+}
+
+/* Direction at one end; chord runs away from it, plane [3] is orthogonal to the curve's plane or NULL. */
+static bool direction_at(const double *chord, const double *normal, const double *guide, const double *plane,
+                         const double *fallback, double *out) {
+  if (guide && vec_dot(guide, guide) > 0 && project(guide, normal, out)) return true;
+  if (plane) {
+    vec_cross(normal, plane, out);
+    if (vec_norm(out) > DIRECTION_MIN) {
+      vec_normalize(out);
+      double forward = vec_dot(out, chord);
+      if (forward < 0)
+        for (int k = 0; k < 3; k++) out[k] = -out[k];
+      if (forward != 0) return true;
+    }
+    project(chord, normal, out);
+    return false;
+  }
+  if (project(chord, normal, out)) return true;
+  if (fallback && project(fallback, normal, out)) return false;
+  net_node any;
+  net_frame(normal, NULL, &any);
+  memcpy(out, any.u, sizeof any.u);
+  return false;
+}
+
+/* The arc of a circle from the chord's start to its end that leaves along the unit vector d. */
+static double arc_length(const double *d, const double *chord) {
+  double across[3];
+  vec_cross(d, chord, across);
+  double angle = fmin(atan2(vec_norm(across), vec_dot(d, chord)), ARC_ANGLE_MAX);
+  double stretch = angle < 1e-4 ? 1 + angle * angle / 6 : angle / sin(angle);
+  return vec_norm(chord) * stretch;
+}
+
+/* Newton's method for the two equations above; l in: where to start. False when it does not end near there. */
+static bool solve_lengths(const double *a, const double *b, const double *curvature, double *l) {
+  double start[2] = {l[0], l[1]}, step = INFINITY;
+  for (int pass = 0; pass < 30 && step > 1e-14 * (start[0] + start[1]); pass++) {
+    double f0 = a[0] + b[0] * l[1] - 1.5 * curvature[0] * l[0] * l[0];
+    double f1 = a[1] + b[1] * l[0] - 1.5 * curvature[1] * l[1] * l[1];
+    double j00 = -3 * curvature[0] * l[0], j11 = -3 * curvature[1] * l[1];
+    double det = j00 * j11 - b[0] * b[1];
+    double d0 = (f0 * j11 - f1 * b[0]) / det, d1 = (f1 * j00 - f0 * b[1]) / det;
+    l[0] -= d0;
+    l[1] -= d1;
+    step = fabs(d0) + fabs(d1);
+    if (!isfinite(step)) return false;
+  }
+  for (int k = 0; k < 2; k++)
+    if (!(l[k] >= 0.2 * start[k] && l[k] <= 3 * start[k])) return false;
+  return step <= 1e-10 * (start[0] + start[1]);
+}
+
+/* Lengths of t [2] for L3 and L4; true when they could be had. Where the edge is straight to rounding they cannot,
+ * but any length will do there: *straight. */
+static bool curvature_lengths(const double *chord, const double *const normals[2], const double (*d)[3],
+                              const double *curvature, double *lengths, bool *straight) {
+  double size = vec_norm(chord), l[2];
+  double a[2] = {vec_dot(normals[0], chord), -vec_dot(normals[1], chord)};
+  double b[2] = {vec_dot(normals[0], d[1]), vec_dot(normals[1], d[0])};
+  double bent = 0;
+  for (int k = 0; k < 2; k++) {
+    bent = fmax(bent, fmax(fabs(a[k]) / size, fmax(fabs(b[k]), fabs(curvature[k]) * size)));
+    l[k] = lengths[k] / 3;
+  }
+  *straight = bent < 1e-7;
+  if (*straight || !solve_lengths(a, b, curvature, l)) return false;
+  for (int k = 0; k < 2; k++) lengths[k] = 3 * l[k];
+  return true;
+}
+
+bool net_tangent(batten_network_direction direction, batten_network_length length, const double chord[3],
+                 const double normal_i[3], const double normal_j[3], const double (*guide)[3],
+                 const double *curvature, const double (*fallback)[3], net_local *out) {
+  const double *normals[2] = {normal_i, normal_j};
+  double back[3], sum[3], plane[3], d[2][3], lengths[2];
+  for (int k = 0; k < 3; k++) {
+    back[k] = -chord[k];
+    sum[k] = normal_i[k] + normal_j[k];
+  }
+  const double *chords[2] = {chord, back};
+  bool exact = true, planar = false;
+  if (direction == BATTEN_DIRECTION_D2) {
+    vec_cross(chord, sum, plane);
+    planar = vec_norm(plane) > DIRECTION_MIN * vec_norm(chord);
+    exact = planar;
+    vec_normalize(plane);
+  }
+  for (int end = 0; end < 2; end++) {
+    exact &= direction_at(chords[end], normals[end], guide ? guide[end] : NULL, planar ? plane : NULL,
+                          fallback ? fallback[end] : NULL, d[end]);
+    lengths[end] = length == BATTEN_LENGTH_L1 ? vec_norm(chord) : arc_length(d[end], chords[end]);
+  }
+  bool curved = curvature && (length == BATTEN_LENGTH_L3 || length == BATTEN_LENGTH_L4), straight = false;
+  if (curved) {
+    curved = curvature_lengths(chord, normals, (const double(*)[3])d, curvature, lengths, &straight);
+    exact &= curved || straight;
+  }
+  memset(out, 0, sizeof *out);
+  for (int end = 0; end < 2; end++)
+    for (int k = 0; k < 3; k++) out->t[end][k] = lengths[end] * d[end][k];
+  if (curved && length == BATTEN_LENGTH_L4)
+    for (int end = 0; end < 2; end++) {
+      for (int k = 0; k < 3; k++) out->s[end][k] = 6 * chords[end][k] + 2 * out->t[!end][k] - 4 * out->t[end][k];
+      double part = vec_dot(out->s[end], normals[end]);
+      for (int k = 0; k < 3; k++) out->s[end][k] -= part * normals[end][k];
+    }
+  return !exact;
+}
+
+/* ---- edges of a network --------------------------------------------------------------------------- */
+
+/* Between the other sides of the triangles at the edge's end, projected: for edges that stand upright there. */
+static void upright_fallback(const net_topology *t, const net_node *nodes, uint32_t e, double (*out)[3]) {
+  memset(out, 0, 2 * sizeof *out);
+  for (unsigned end = 0; end < 2; end++) {
+    uint32_t h = t->half[e], node = net_edge_node(t, e, end, 0);
+    const double *p = t->points + (size_t)3 * t->triangles[end ? net_next(h) : h];
+    for (int side = 0; side < 2 && h != NET_NONE; side++, h = t->twin[h]) {
+      double a[3], d[3];
+      vec_sub(t->points + (size_t)3 * t->triangles[net_prev(h)], p, a);
+      if (project(a, nodes[node].w, d))
+        for (int k = 0; k < 3; k++) out[end][k] += d[k];
+    }
+  }
+}
+
+/* Derivatives of a crease are the same on both sides: directions are those of the crease, where it has some, else
+ * the projected edge at an end where both sides have one plane; nothing is asked of the other planes. */
+static bool crease_tangent(const net_topology *t, batten_network_length length, const net_node *nodes, uint32_t e,
+                           const double *chord, const double (*guide)[3], const double (*fallback)[3],
+                           net_local *out) {
+  double back[3] = {-chord[0], -chord[1], -chord[2]};
+  const double *chords[2] = {chord, back};
+  bool exact = true;
+  memset(out, 0, sizeof *out);
+  for (unsigned end = 0; end < 2; end++) {
+    uint32_t node = net_edge_node(t, e, end, 0);
+    double d[3] = {0};
+    if (guide) memcpy(d, guide[end], sizeof d);
+    if (!t->constraint || t->constraint[node].kind == NET_FREE || !vec_normalize(d))
+      exact &= direction_at(chords[end], nodes[node].w, guide ? guide[end] : NULL, NULL,
+                            fallback ? fallback[end] : NULL, d);
+    double size = length == BATTEN_LENGTH_L1 ? vec_norm(chord) : arc_length(d, chords[end]);
+    for (int k = 0; k < 3; k++) out->t[end][k] = size * d[k];
+  }
+  return !exact;
+}
+
+static double form_value(const net_node *node, const double *form, const double *t) {
+  double a = vec_dot(t, node->u), b = vec_dot(t, node->v);
+  return (form[0] * a * a + 2 * form[1] * a * b + form[2] * b * b) / (a * a + b * b);
+}
+
+bool net_tangent_edge(const net_topology *t, const batten_network_options *opt, const net_node *nodes,
+                      const double *forms, uint32_t e, net_local *out) {
+  static const double none[6] = {0};
+  uint32_t h = t->half[e], i = net_edge_node(t, e, 0, 0), j = net_edge_node(t, e, 1, 0);
+  const double(*guide)[3] = t->guide ? (const double(*)[3])(t->guide + (size_t)6 * e) : NULL;
+  const double *wi = nodes[i].w, *wj = nodes[j].w;
+  bool bent = t->bend && memcmp(t->bend + (size_t)6 * e, none, sizeof none) != 0;
+  bool crease = t->kind[e] == NET_CREASE;
+  batten_network_length length = opt->length;
+  double chord[3], curvature[2], fallback[2][3];
+  vec_sub(t->points + (size_t)3 * t->triangles[net_next(h)], t->points + (size_t)3 * t->triangles[h], chord);
+  bool curved = forms && !bent && !crease && (length == BATTEN_LENGTH_L3 || length == BATTEN_LENGTH_L4);
+  if (!curved && length != BATTEN_LENGTH_L1) length = BATTEN_LENGTH_L2;
+
+  const double(*upright)[3] = NULL;
+  bool substitute = false;
+  for (int attempt = 0; attempt < 2 && (attempt == 0 || substitute); attempt++) {
+    if (attempt) {
+      upright_fallback(t, nodes, e, fallback);
+      upright = (const double(*)[3])fallback;
+    }
+    if (crease) {
+      substitute = crease_tangent(t, length, nodes, e, chord, guide, upright, out);
+      continue;
+    }
+    if (curved) {
+      net_tangent(opt->direction, BATTEN_LENGTH_L1, chord, wi, wj, guide, NULL, upright, out);
+      curvature[0] = form_value(&nodes[i], forms + (size_t)3 * i, out->t[0]);
+      curvature[1] = form_value(&nodes[j], forms + (size_t)3 * j, out->t[1]);
+    }
+    substitute = net_tangent(opt->direction, length, chord, wi, wj, guide, curved ? curvature : NULL, upright, out);
+  }
+  return substitute;
+}
