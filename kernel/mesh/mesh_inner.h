@@ -1,4 +1,4 @@
-/* What a mesh is made of; for kernel/mesh only. */
+/* What a mesh is made of; for kernel/mesh, and the sorting of edges for kernel/network too. */
 #ifndef BATTEN_MESH_INNER_H
 #define BATTEN_MESH_INNER_H
 
