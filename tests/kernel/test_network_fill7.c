@@ -1,0 +1,145 @@
+/* Patches of degree 7: joints, the least integral inside, invariances, refusals. */
+#include "network_rig.h"
+
+#include "basis/triangular.h"
+
+static batten_context *ctx;
+
+/* Whatever the nodes' data, the joints hold: the field and the curve decide, not how they were found. */
+static void joints(void) {
+  const struct {
+    const char *name;
+    scene_mesh mesh;
+  } all[] = {{"octahedron", scene_mesh_octahedron()},
+             {"shifted octahedron", scene_mesh_octahedron_shifted(.5, .3)},
+             {"tetrahedron", scene_mesh_tetrahedron()},
+             {"sphere 42", scene_mesh_icosphere(2)},
+             {"torus", scene_mesh_torus_10_6()},
+             {"graph", scene_mesh_graph_7()},
+             {"ears", scene_mesh_ears(4)},
+             {"noisy sphere", scene_mesh_sphere_noisy()}};
+  for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
+    network_rig r;
+    rig_open(ctx, all[i].mesh, NULL, NULL, &r);
+    rig_nodes_random(&r, 0.3, 7 + i);
+    joint_figures j = rig_fill(&r, RIG_7, 21);
+    T_RATIO(j.angle_deg, 1e-11, "%s: normals at joints, degrees", all[i].name);
+    T_RATIO(j.gap, 1e-14, "%s: gap", all[i].name);
+    T_CHECK(r.refused == 0 && j.jacobian > 0.1, "%s: all %zu regular, least normal %.3g", all[i].name,
+            r.topology.faces, j.jacobian);
+    rig_close(&r);
+  }
+}
+
+/* int S_xx^2 + 2 S_xy^2 + S_yy^2 over the equilateral triangle, to a constant factor, by sums over midpoints of a
+ * fine grid: the change of the integral with an interior point, over the second change. */
+static void interior_is_least(void) {
+  network_rig r;
+  rig_open(ctx, scene_mesh_octahedron_shifted(.5, .3), NULL, NULL, &r);
+  rig_nodes_random(&r, 0.3, 3);
+  rig_fill(&r, RIG_7, 3);
+  /* 16 Gauss points for degree 10 a direction, collapsed: exact. */
+  static const double nodes[6] = {0.0337652428984240, 0.1693953067668678, 0.3806904069584015,
+                                  0.6193095930415985, 0.8306046932331322, 0.9662347571015760};
+  static const double weights[6] = {0.0856622461895852, 0.1803807865240693, 0.2339569672863455,
+                                    0.2339569672863455, 0.1803807865240693, 0.0856622461895852};
+  double first[3][3] = {{0}}, size = 0;
+  for (int a = 0; a < 6; a++)
+    for (int b = 0; b < 6; b++) {
+      double u = nodes[a], v = nodes[b] * (1 - u), table[6 * 36], jet[6][3];
+      triangular_basis(7, u, v, 2, table);
+      triangular_jet(7, (const double(*)[3])r.single[2], u, v, 2, jet);
+      /* x = u + v / 2, y = sqrt(3) / 2 v: d/dx = d/du, d/dy = (2 d/dv - d/du) / sqrt 3. */
+      for (int x = 0; x < 3; x++) {
+        double xx = jet[3][x], xy = (2 * jet[4][x] - xx) / sqrt(3), yy = (4 * (jet[5][x] - jet[4][x]) + xx) / 3;
+        size += weights[a] * weights[b] * (1 - u) * (xx * xx + 2 * xy * xy + yy * yy);
+        for (int i = 0; i < 3; i++) {
+          const double *t = table + NET_DEGREE7_INTERIOR[i];
+          double b_xx = t[3 * 36], b_xy = (2 * t[4 * 36] - b_xx) / sqrt(3);
+          double b_yy = (4 * (t[5 * 36] - t[4 * 36]) + b_xx) / 3;
+          first[i][x] += weights[a] * weights[b] * (1 - u) * (xx * b_xx + 2 * xy * b_xy + yy * b_yy);
+        }
+      }
+    }
+  double worst = 0;
+  for (int i = 0; i < 9; i++) worst = fmax(worst, fabs(first[i / 3][i % 3]));
+  T_RATIO(worst / size, 1e-13, "the interior points make the integral stationary");
+  int sum = 0;
+  for (int i = 0; i < 36; i++) sum += net_degree7_weights[i];
+  T_CHECK(sum == 66, "weights of %d / 66 keep what is added to all points", sum);
+  rig_close(&r);
+}
+
+/* Turning the corners turns the net. */
+static void corners_turn(void) {
+  network_rig r;
+  rig_open(ctx, scene_mesh_octahedron_shifted(.5, .3), NULL, NULL, &r);
+  rig_nodes_random(&r, 0.3, 4);
+  net_node node[3], node_b[3];
+  net_ribbon ribbon[3], ribbon_b[3], back;
+  double net[36][3], net_b[36][3], worst = 0;
+  net_facet_ribbons(&r.topology, r.nodes, r.local, 0, node, ribbon);
+  for (int k = 0; k < 3; k++) {
+    node_b[k] = node[(k + 1) % 3];
+    ribbon_b[k] = ribbon[(k + 1) % 3];
+  }
+  T_CHECK(net_fill_degree7(node, ribbon, net) && net_fill_degree7(node_b, ribbon_b, net_b), "a facet");
+  for (unsigned c = 0; c <= 7; c++)
+    for (unsigned b = 0; b + c <= 7; b++)
+      for (int x = 0; x < 3; x++)
+        worst = fmax(worst, fabs(net[triangular_index(7, b, c)][x] - net_b[triangular_index(7, c, 7 - b - c)][x]));
+  T_RATIO(worst, 1e-14, "corners in turn");
+  net_ribbon_reverse(&ribbon[0], &back);
+  net_ribbon_reverse(&back, &back);
+  T_CHECK(!memcmp(&back, &ribbon[0], sizeof back), "reversed twice is the same");
+  rig_close(&r);
+}
+
+/* A flat facet stays flat and has the straight lines' parameters: all points of the net where a plane's are. */
+static void plane(void) {
+  network_rig r;
+  rig_open(ctx, scene_mesh_plane(3), NULL, NULL, &r);
+  rig_nodes_random(&r, 0, 1);
+  rig_fill(&r, RIG_7, 3);
+  double worst = 0;
+  for (size_t f = 0; f < r.topology.faces; f++)
+    for (unsigned c = 0; c <= 7; c++)
+      for (unsigned b = 0; b + c <= 7; b++)
+        for (int x = 0; x < 3; x++) {
+          const uint32_t *v = r.mesh.corners + 3 * f;
+          double sum = 0, part[3] = {(7. - b - c) / 7, b / 7., c / 7.};
+          for (int k = 0; k < 3; k++) sum += part[k] * r.mesh.points[3 * v[k] + (unsigned)x];
+          worst = fmax(worst, fabs(sum - r.single[f][triangular_index(7, b, c)][x]));
+        }
+  T_RATIO(worst, 1e-14, "a plane's facets have the control points of the plane");
+  rig_close(&r);
+}
+
+/* k that turns negative, and a field along the curve: refused, though written. */
+static void refusals(void) {
+  net_ribbon ribbon = {{{0, 0, 0}, {.2, 0, 0}, {.4, 0, 0}, {.6, 0, 0}, {.8, 0, 0}, {1, 0, 0}},
+                       {{0, 1, 0}, {0, 1, 0}, {0, 1, 0}, {0, 1, 0}}};
+  const double good[4] = {1, 1, 1, 1}, dips[4] = {1, -.2, -.2, 1}, bad[4] = {1, -1, -1, 1}, none[4] = {0};
+  const double nan[4] = {1, NAN, 1, 1};
+  T_CHECK(net_across_regular(3, good, &ribbon), "straight");
+  T_CHECK(net_across_regular(3, dips, &ribbon), "coefficients below 0, but not the polynomial: proven on parts");
+  T_CHECK(!net_across_regular(3, bad, &ribbon), "below 0 in the middle");
+  T_CHECK(!net_across_regular(3, none, &ribbon) && !net_across_regular(3, nan, &ribbon), "0 and NaN");
+  T_CHECK(!net_across_regular(1, dips, &ribbon), "linear: below 0 at the end");
+  for (int k = 1; k < 3; k++) {
+    ribbon.d[k][0] = 5;
+    ribbon.d[k][1] = -1.2;
+  }
+  T_CHECK(!net_across_regular(3, good, &ribbon), "the field turns to the other side of the curve");
+}
+
+int main(void) {
+  ctx = t_context(NULL, NULL, 1);
+  joints();
+  interior_is_least();
+  corners_turn();
+  plane();
+  refusals();
+  batten_context_free(ctx);
+  return t_done();
+}
