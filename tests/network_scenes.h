@@ -347,12 +347,13 @@ static inline scene_mesh scene_mesh_cells(size_t nx, size_t ny, size_t nz, const
   return m;
 }
 
-/* A bar with three holes, smoothed: genus 3. */
+/* A bar 7 : 3 : 1 with three square holes, of cells of half that thickness, smoothed: genus 3. */
 static inline scene_mesh scene_mesh_genus3(void) {
-  unsigned char cells[7 * 3];
-  for (size_t i = 0; i < 7; i++)
-    for (size_t j = 0; j < 3; j++) cells[3 * i + j] = !(i % 2 == 1 && j == 1);
-  return scene_mesh_cells(7, 3, 1, cells, 3);
+  unsigned char cells[14 * 6 * 2];
+  for (size_t i = 0; i < 14; i++)
+    for (size_t j = 0; j < 6; j++)
+      for (size_t k = 0; k < 2; k++) cells[(6 * i + j) * 2 + k] = !(i / 2 % 2 == 1 && j / 2 == 1);
+  return scene_mesh_cells(14, 6, 2, cells, 3);
 }
 
 /* The cube [-1, 1]^3 with 3 x 3 vertices a side, diagonals through the middles of the sides: sharp, and treated as if
@@ -555,8 +556,25 @@ static inline size_t scene_half_edge(const scene_mesh *m, uint32_t a, uint32_t b
   return SIZE_MAX;
 }
 
-/* Turns the edge of half-edge h, p -> q between r and s, into r - s, when the mesh stays star-shaped with angles
- * that are not too flat, no edge doubles and all valences stay in 3 .. 20. */
+/* A triangle on the unit sphere that is not too large (its plane passes the origin at .85 or more) and has no angle
+ * below 9 degrees. */
+static inline bool scene_triangle_good(const double *a, const double *b, const double *c) {
+  double u[3], v[3], uu = 0, vv = 0, uv = 0;
+  for (int k = 0; k < 3; k++) {
+    u[k] = b[k] - a[k];
+    v[k] = c[k] - a[k];
+    uu += u[k] * u[k];
+    vv += v[k] * v[k];
+    uv += u[k] * v[k];
+  }
+  double twice = sqrt(fmax(uu * vv - uv * uv, 0)), least = fmin(uu, fmin(vv, uu + vv - 2 * uv));
+  /* The shortest side is opposite to the least angle: its tangent is twice the area over the others' product. */
+  double across = least == uu ? vv - uv : least == vv ? uu - uv : uv;
+  return scene_turn(a, b, c) > 0.85 * twice && twice > 0.1584 * across;
+}
+
+/* Turns the edge of half-edge h, p -> q between r and s, into r - s, when no triangle gets too large or
+ * flat by that, no edge doubles and all valences stay in 3 .. 20. */
 static inline bool scene_flip(scene_mesh *m, unsigned *valence, size_t h) {
   uint32_t *c = m->corners, p = c[h], q = c[h % 3 == 2 ? h - 2 : h + 1], r = c[h % 3 == 0 ? h + 2 : h - 1];
   size_t g = scene_half_edge(m, q, p);
@@ -564,9 +582,8 @@ static inline bool scene_flip(scene_mesh *m, unsigned *valence, size_t h) {
   const double *x = m->points;
   if (valence[p] == 3 || valence[q] == 3 || valence[r] == 20 || valence[s] == 20) return false;
   if (scene_half_edge(m, r, s) != SIZE_MAX) return false;
-  double area = scene_turn(x + 3 * p, x + 3 * q, x + 3 * r) + scene_turn(x + 3 * q, x + 3 * p, x + 3 * s);
-  if (scene_turn(x + 3 * r, x + 3 * s, x + 3 * q) < 0.15 * area) return false;
-  if (scene_turn(x + 3 * s, x + 3 * r, x + 3 * p) < 0.15 * area) return false;
+  if (!scene_triangle_good(x + 3 * r, x + 3 * s, x + 3 * q)) return false;
+  if (!scene_triangle_good(x + 3 * s, x + 3 * r, x + 3 * p)) return false;
   scene_triangle_set(c + h / 3 * 3, r, s, q);
   scene_triangle_set(c + g / 3 * 3, s, r, p);
   valence[p]--;
@@ -576,13 +593,19 @@ static inline bool scene_flip(scene_mesh *m, unsigned *valence, size_t h) {
   return true;
 }
 
-/* Halves the edge of half-edge h; the mesh has room. */
-static inline void scene_edge_split(scene_mesh *m, unsigned *valence, size_t h) {
+/* Halves the edge of half-edge h, when the four triangles are good; the mesh has room. */
+static inline bool scene_edge_split(scene_mesh *m, unsigned *valence, size_t h) {
   uint32_t *c = m->corners, p = c[h], q = c[h % 3 == 2 ? h - 2 : h + 1], r = c[h % 3 == 0 ? h + 2 : h - 1];
-  size_t g = scene_half_edge(m, q, p), v = m->vertices++;
+  size_t g = scene_half_edge(m, q, p), v = m->vertices;
   uint32_t s = c[g % 3 == 0 ? g + 2 : g - 1];
   for (size_t k = 0; k < 3; k++) m->points[3 * v + k] = m->points[3 * p + k] + m->points[3 * q + k];
+  const double *x = m->points;
   scene_point_unit(m->points + 3 * v);
+  if (!scene_triangle_good(x + 3 * p, x + 3 * v, x + 3 * r) ||
+      !scene_triangle_good(x + 3 * v, x + 3 * q, x + 3 * r) ||
+      !scene_triangle_good(x + 3 * v, x + 3 * p, x + 3 * s) || !scene_triangle_good(x + 3 * q, x + 3 * v, x + 3 * s))
+    return false;
+  m->vertices++;
   scene_triangle_set(c + h / 3 * 3, p, v, r);
   scene_triangle_set(c + g / 3 * 3, v, p, s);
   scene_triangle_set(c + 3 * m->triangles++, v, q, r);
@@ -590,14 +613,15 @@ static inline void scene_edge_split(scene_mesh *m, unsigned *valence, size_t h) 
   valence[v] = 4;
   valence[r]++;
   valence[s]++;
+  return true;
 }
 
-/* Closed meshes around the origin with valences from 3 to 20: an icosphere of frequency 1, 2 or 3, some triangles
+/* Closed meshes around the origin with valences from 3 to 20: an icosphere of frequency 2 or 3, some triangles
  * split, edges flipped at random, one or two vertices fed with the edges opposite to them, which are flipped or else
- * halved, until they have 8 .. 20, radii off by up to a tenth. Any seed. */
+ * halved, until they have up to 20, all radii off by up to 2 %. Any seed. */
 static inline scene_mesh scene_mesh_random(uint64_t seed) {
   uint64_t state = seed * 0x9e3779b97f4a7c15u + 12345;
-  scene_mesh base = scene_mesh_icosphere(1 + (size_t)(3 * scene_uniform(&state)));
+  scene_mesh base = scene_mesh_icosphere(2 + (size_t)(2 * scene_uniform(&state)));
   size_t splits = (size_t)(scene_uniform(&state) * 0.2 * (double)base.triangles);
   enum { HUBS = 2, ROOM = HUBS * 20 };
   scene_mesh m = scene_mesh_make(base.vertices + splits + ROOM, base.triangles + 2 * (splits + ROOM));
@@ -609,10 +633,16 @@ static inline scene_mesh scene_mesh_random(uint64_t seed) {
   scene_mesh_shift(&m, 0.1, state);
   for (size_t i = 0; i < splits; i++) {
     uint32_t *t = m.corners + 3 * (size_t)(scene_uniform(&state) * (double)m.triangles), c[3] = {t[0], t[1], t[2]};
-    size_t v = m.vertices++;
+    size_t v = m.vertices;
+    const double *x = m.points;
     for (size_t k = 0; k < 3; k++)
       m.points[3 * v + k] = m.points[3 * c[0] + k] + m.points[3 * c[1] + k] + m.points[3 * c[2] + k];
     scene_point_unit(m.points + 3 * v);
+    if (!scene_triangle_good(x + 3 * c[0], x + 3 * c[1], x + 3 * v) ||
+        !scene_triangle_good(x + 3 * c[1], x + 3 * c[2], x + 3 * v) ||
+        !scene_triangle_good(x + 3 * c[2], x + 3 * c[0], x + 3 * v))
+      continue;
+    m.vertices++;
     scene_triangle_set(t, c[0], c[1], v);
     scene_triangle_set(m.corners + 3 * m.triangles++, c[1], c[2], v);
     scene_triangle_set(m.corners + 3 * m.triangles++, c[2], c[0], v);
@@ -632,15 +662,13 @@ static inline scene_mesh scene_mesh_random(uint64_t seed) {
       }
       if (m.corners[h % 3 == 0 ? h + 2 : h - 1] != hub || scene_flip(&m, valence, h)) continue;
       size_t g = scene_half_edge(&m, m.corners[h % 3 == 2 ? h - 2 : h + 1], m.corners[h]);
-      if (turns > 0 && h != last && valence[m.corners[g % 3 == 0 ? g + 2 : g - 1]] < 20) {
-        scene_edge_split(&m, valence, h);
-        last = h; /* half of it: some other edge next */
-      }
+      if (turns > 0 && h != last && valence[m.corners[g % 3 == 0 ? g + 2 : g - 1]] < 20)
+        if (scene_edge_split(&m, valence, h)) last = h; /* half of it: some other edge next */
     }
   }
   free(valence);
   for (size_t v = 0; v < m.vertices; v++) {
-    double r = 1 + 0.1 * (2 * scene_uniform(&state) - 1);
+    double r = 1 + 0.02 * (2 * scene_uniform(&state) - 1);
     for (size_t k = 0; k < 3; k++) m.points[3 * v + k] *= r;
   }
   return m;
