@@ -35,7 +35,8 @@ static inline uint32_t net_prev(uint32_t h) { return h % 3 == 0 ? h + 2 : h - 1;
 
 typedef enum net_edge_kind {
   NET_SMOOTH = 0, /* normals agree across it */
-  NET_CREASE,     /* two sides with tangent planes of their own, at regular crease vertices */
+  NET_CREASE,     /* two sides with tangent planes of their own; one side where a boundary is a curve of its own. The
+                     curve is fixed at its ends where the nodes are not free */
   NET_BOUNDARY    /* one side, curve as free as a smooth edge's */
 } net_edge_kind;
 
@@ -77,8 +78,10 @@ typedef struct net_topology {
  */
 batten_status net_topology_make(batten_context *ctx, size_t vertices, const double *points, size_t faces,
                                 const uint32_t *triangles, net_topology *out);
-/* Creases, corners, boundary curves and lines of opt: kinds, nodes, guides, bends, constraints. INVALID: pairs that
- * are no edges, lines that do not run along edges, ... */
+/* Creases, corners, boundary curves and lines of opt: kinds, nodes, guides (unit vectors), bends, constraints.
+ * INVALID: pairs that are no edges, lines that do not run along edges, ...; the topology is then good for
+ * net_topology_free alone. The half-edges out of a vertex that have the same node are its fan, from node_first on;
+ * one crease that ends inside the mesh does not cut it, and the fan then begins there. */
 batten_status net_features_make(batten_context *ctx, const batten_network_options *opt, net_topology *topology);
 void net_topology_free(batten_context *ctx, net_topology *topology);
 

@@ -1,0 +1,545 @@
+/* Creases, corners, boundary curves and polylines of a network.
+ *
+ * An end of a crease is an edge at one of its vertices. Its tangent is fixed before the normals are known:
+ *   two ends that turn by no more than the corner angle are mates: both lie along the tangent of the circle through
+ *   the three vertices;
+ *   a single end in the mesh's inside is a dart: the surface closes around it and tells the direction;
+ *   all others are corners: an end lies along the tangent of the circle that continues the edge's other end, or along
+ *   the edge when that is no better known.
+ * The creases cut the fan of a vertex into sectors, which become the nodes. The tangents at its sides fix the plane
+ * of a sector: wholly (NET_CORNER), or up to the turn about one line (NET_CREASED). The curvature of the crease,
+ * which the surfaces on both sides share, is that of its cubic Hermite curves with lengths of arcs of circles. */
+#include "net.h"
+
+#include "base/checked.h"
+
+#include <string.h>
+
+static const double RADIANS = 0.017453292519943295769;
+
+/* Tangents at the two sides of a sector say little of its plane when they are nearly opposite. Mates are made of ends
+ * that turn by less than STRAIGHT, and of those below BENT (1 radian is 57 degrees) whose plane leaves the mean plane
+ * of the sector's triangles by more than ASTRAY. */
+static const double STRAIGHT = 0.05, BENT = 0.5, ASTRAY = 0.5;
+
+/* Below this angle two tangents at a corner count as one. */
+static const double CUSP = 1e-6;
+
+/* Angles of coordinates in single precision that are meant to be equal differ by so much: a prism with six sides
+ * turns by 60 degrees at every corner. */
+static const double SLACK = 1e-6;
+
+typedef struct features {
+  net_topology *t;
+  uint32_t *first;         /* [V] half-edge with which the fan of a vertex begins: creases do not end it */
+  uint32_t *mate;          /* [2 edges] by end: the end on which the curve goes on, or NET_NONE */
+  unsigned char *open;     /* [2 edges] non-zero: an end whose direction is free, at a dart */
+  uint32_t *ends;          /* [most triangles at a vertex + 1] ends at the vertex in hand, counter-clockwise */
+  unsigned char *straight; /* [as many] */
+  double corner_angle;
+} features;
+
+/* ---- ends --------------------------------------------------------------------------------------- */
+
+/* End 2 e + 0 is edge e at its start, 2 e + 1 at its end. */
+static uint32_t end_at_start(const net_topology *t, uint32_t h) {
+  return 2 * t->edge[h] + (t->half[t->edge[h]] != h);
+}
+static uint32_t end_at_end(const net_topology *t, uint32_t h) { return end_at_start(t, h) ^ 1; }
+
+static uint32_t end_vertex(const net_topology *t, uint32_t end) {
+  uint32_t h = t->half[end / 2];
+  return t->triangles[end % 2 ? net_next(h) : h];
+}
+
+/* From the end's vertex to the other. */
+static void end_chord(const net_topology *t, uint32_t end, double *out) {
+  vec_sub(t->points + 3 * (size_t)end_vertex(t, end ^ 1), t->points + 3 * (size_t)end_vertex(t, end), out);
+}
+
+static double angle_between(const double *a, const double *b) {
+  double c[3];
+  vec_cross(a, b, c);
+  return atan2(vec_norm(c), vec_dot(a, b));
+}
+
+/* The turn of a curve that comes in along a and goes out along b, both directions pointing out. */
+static double turn_between(const double *a, const double *b) {
+  double back[3] = {-a[0], -a[1], -a[2]};
+  return angle_between(back, b);
+}
+
+/* Tangent at the middle one of three vertices of their circle, from a towards b. False when there is none. */
+static bool circle_tangent(const net_topology *t, uint32_t a, uint32_t b, double *out) {
+  double p[3], q[3];
+  end_chord(t, a, p);
+  end_chord(t, b, q);
+  double pp = vec_dot(p, p), qq = vec_dot(q, q);
+  for (int k = 0; k < 3; k++) out[k] = q[k] / qq - p[k] / pp;
+  return vec_normalize(out);
+}
+
+static double chord_turn(const net_topology *t, uint32_t a, uint32_t b) {
+  double p[3], q[3];
+  end_chord(t, a, p);
+  end_chord(t, b, q);
+  return turn_between(p, q);
+}
+
+/* out = direction at one end of an arc over the chord whose other end leaves along d: its mirror image. */
+static void mirror(const double *chord, const double *d, double *out) {
+  double factor = 2 * vec_dot(d, chord) / vec_dot(chord, chord);
+  for (int k = 0; k < 3; k++) out[k] = d[k] - factor * chord[k];
+}
+
+/* a and b become mates with a common tangent that points out along b. */
+static void join_ends(features *f, uint32_t a, uint32_t b, const double *tangent) {
+  for (int k = 0; k < 3; k++) {
+    f->t->guide[3 * (size_t)a + (size_t)k] = -tangent[k];
+    f->t->guide[3 * (size_t)b + (size_t)k] = tangent[k];
+  }
+  f->mate[a] = b;
+  f->mate[b] = a;
+}
+
+/* The crease ends at v in f->ends; their number. */
+static size_t gather_ends(const features *f, uint32_t v) {
+  const net_topology *t = f->t;
+  size_t count = 0;
+  uint32_t h = f->first[v], next;
+  for (bool more = true; more; h = next) {
+    if (t->kind[t->edge[h]] == NET_CREASE) f->ends[count++] = end_at_start(t, h);
+    uint32_t in = net_prev(h);
+    next = t->twin[in];
+    more = next != NET_NONE && next != f->first[v];
+    if (next == NET_NONE && t->kind[t->edge[in]] == NET_CREASE) f->ends[count++] = end_at_end(t, in);
+  }
+  return count;
+}
+
+static bool is_on_boundary(const features *f, uint32_t v) { return f->t->twin[f->first[v]] == NET_NONE; }
+static bool is_boundary_edge(const net_topology *t, uint32_t e) { return t->twin[t->half[e]] == NET_NONE; }
+
+/* ---- which edges -------------------------------------------------------------------------------- */
+
+/* The edge between two vertices, or NET_NONE: by the fan of the one with fewer triangles. */
+static uint32_t find_edge(const features *f, const uint32_t *valence, uint32_t a, uint32_t b) {
+  const net_topology *t = f->t;
+  if (a >= t->vertices || b >= t->vertices || a == b) return NET_NONE;
+  if (valence[b] < valence[a]) {
+    uint32_t swap = a;
+    a = b;
+    b = swap;
+  }
+  uint32_t h = f->first[a], next;
+  for (bool more = true; more; h = next) {
+    if (t->triangles[net_next(h)] == b) return t->edge[h];
+    if (t->triangles[net_prev(h)] == b) return t->edge[net_prev(h)];
+    next = t->twin[net_prev(h)];
+    more = next != NET_NONE && next != f->first[a];
+  }
+  return NET_NONE;
+}
+
+static double dihedral(const net_topology *t, uint32_t e) {
+  uint32_t face[2] = {t->half[e] / 3, t->twin[t->half[e]] / 3};
+  double n[2][3];
+  for (int s = 0; s < 2; s++) {
+    const uint32_t *v = t->triangles + 3 * (size_t)face[s];
+    vec_triangle_normal(t->points + 3 * (size_t)v[0], t->points + 3 * (size_t)v[1], t->points + 3 * (size_t)v[2],
+                        n[s]);
+    vec_normalize(n[s]);
+  }
+  return angle_between(n[0], n[1]);
+}
+
+/* is_crease [edges]. */
+static batten_status find_creases(batten_context *ctx, const features *f, const batten_network_options *opt,
+                                  const uint32_t *valence, unsigned char *is_crease) {
+  const net_topology *t = f->t;
+  if (opt->crease_count && !opt->creases)
+    return batten_fail(ctx, BATTEN_E_INVALID, "opt.creases: NULL; give %zu pairs of vertices", opt->crease_count);
+  for (uint32_t e = 0; e < t->edges; e++) {
+    bool boundary = is_boundary_edge(t, e);
+    is_crease[e] = boundary ? opt->boundary_curves != 0
+                            : opt->crease_angle_deg > 0 && dihedral(t, e) > opt->crease_angle_deg * RADIANS + SLACK;
+  }
+  for (size_t i = 0; i < opt->crease_count; i++) {
+    const uint32_t *pair = opt->creases + 2 * i;
+    uint32_t e = find_edge(f, valence, pair[0], pair[1]);
+    if (e == NET_NONE)
+      return batten_fail(ctx, BATTEN_E_INVALID,
+                         "opt.creases[%zu]: vertices %lu and %lu; give the ends of an edge of the mesh", i,
+                         (unsigned long)pair[0], (unsigned long)pair[1]);
+    is_crease[e] = 1;
+  }
+  return BATTEN_OK;
+}
+
+/* ---- tangents ----------------------------------------------------------------------------------- */
+
+/* Mates and open ends at v; guides of mates. */
+static void judge_vertex(features *f, uint32_t v) {
+  size_t count = gather_ends(f, v);
+  const uint32_t *ends = f->ends;
+  double tangent[3];
+  if (count == 1 && (!is_on_boundary(f, v) || is_boundary_edge(f->t, ends[0] / 2))) f->open[ends[0]] = 1;
+  if (count == 2 && chord_turn(f->t, ends[0], ends[1]) <= f->corner_angle &&
+      circle_tangent(f->t, ends[0], ends[1], tangent))
+    join_ends(f, ends[0], ends[1], tangent);
+}
+
+/* Guides of ends without mates. */
+static void continue_ends(features *f) {
+  net_topology *t = f->t;
+  for (uint32_t end = 0; end < 2 * t->edges; end++) {
+    if (t->kind[end / 2] != NET_CREASE || f->mate[end] != NET_NONE || f->open[end]) continue;
+    double *guide = t->guide + 3 * (size_t)end, chord[3];
+    end_chord(t, end, chord);
+    if (f->mate[end ^ 1] == NET_NONE)
+      memcpy(guide, chord, sizeof chord);
+    else
+      mirror(chord, t->guide + 3 * (size_t)(end ^ 1), guide);
+    vec_normalize(guide);
+  }
+}
+
+/* Angle-weighted normal of the triangles from the side `end`, counter-clockwise, to the next crease. */
+static void sector_normal(const features *f, uint32_t end, double *out) {
+  const net_topology *t = f->t;
+  uint32_t h = t->half[end / 2];
+  if (end % 2) h = t->twin[h]; /* sectors do not begin at the end of a boundary edge's only half-edge */
+  out[0] = out[1] = out[2] = 0;
+  for (;;) {
+    const double *p = t->points + 3 * (size_t)t->triangles[h], *q = t->points + 3 * (size_t)t->triangles[net_next(h)],
+                 *r = t->points + 3 * (size_t)t->triangles[net_prev(h)];
+    double n[3], angle = vec_angle(p, q, r);
+    vec_triangle_normal(p, q, r, n);
+    vec_normalize(n);
+    for (int k = 0; k < 3; k++) out[k] += angle * n[k];
+    uint32_t in = net_prev(h);
+    if (t->twin[in] == NET_NONE || t->kind[t->edge[in]] == NET_CREASE) break;
+    h = t->twin[in];
+  }
+  vec_normalize(out);
+}
+
+/* How far the sector between two ends without mates turns, when its plane is better left to the triangles; else
+ * INFINITY. */
+static double straightness(const features *f, uint32_t a, uint32_t b) {
+  if (f->mate[a] != NET_NONE || f->mate[b] != NET_NONE) return INFINITY;
+  const double *p = f->t->guide + 3 * (size_t)a, *q = f->t->guide + 3 * (size_t)b;
+  double turn = turn_between(p, q), plane[3], normal[3];
+  if (turn < STRAIGHT) return turn;
+  if (turn > BENT) return INFINITY;
+  vec_cross(p, q, plane);
+  sector_normal(f, a, normal);
+  double astray = angle_between(plane, normal);
+  return fmin(astray, 180 * RADIANS - astray) > ASTRAY ? turn : INFINITY;
+}
+
+/* Ends that close in on each other go back to their edges, which stand apart. */
+static void part_ends(features *f, size_t count, size_t sectors) {
+  for (size_t i = 0; i < count; i++) f->straight[i] = 0;
+  for (size_t i = 0; i < sectors; i++) {
+    size_t side[2] = {i, (i + 1) % count};
+    double chord[2][3];
+    for (int s = 0; s < 2; s++) end_chord(f->t, f->ends[side[s]], chord[s]);
+    const double *p = f->t->guide + 3 * (size_t)f->ends[side[0]], *q = f->t->guide + 3 * (size_t)f->ends[side[1]];
+    if (angle_between(p, q) < 0.5 * angle_between(chord[0], chord[1]))
+      f->straight[side[0]] = f->straight[side[1]] = 1;
+  }
+  for (size_t i = 0; i < count; i++) {
+    double *guide = f->t->guide + 3 * (size_t)f->ends[i];
+    if (!f->straight[i]) continue;
+    end_chord(f->t, f->ends[i], guide);
+    vec_normalize(guide);
+  }
+}
+
+/* Where continued tangents leave a sector no clear plane: ends that oppose each other become mates, the straightest
+ * first. */
+static void settle_corner(features *f, uint32_t v) {
+  size_t count = gather_ends(f, v), sectors = is_on_boundary(f, v) ? count - 1 : count;
+  if (count < 2 || f->mate[f->ends[0]] != NET_NONE) return;
+  part_ends(f, count, sectors);
+  for (;;) {
+    size_t best = count;
+    double least = INFINITY, tangent[3];
+    for (size_t i = 0; i < sectors; i++) {
+      double turn = straightness(f, f->ends[i], f->ends[(i + 1) % count]);
+      if (turn >= least) continue;
+      least = turn;
+      best = i;
+    }
+    if (best == count) return;
+    uint32_t a = f->ends[best], b = f->ends[(best + 1) % count];
+    vec_sub(f->t->guide + 3 * (size_t)b, f->t->guide + 3 * (size_t)a, tangent);
+    vec_normalize(tangent);
+    join_ends(f, a, b, tangent);
+  }
+}
+
+/* ---- curvatures --------------------------------------------------------------------------------- */
+
+/* out = d with the length of the arc over the chord that leaves along d, L2 of the paper. */
+static void arc(const double *chord, const double *d, double *out) {
+  double angle = fmin(angle_between(chord, d), 2.6); /* a third of the arc stays within five chords */
+  double length = vec_norm(chord) * (angle < 1e-4 ? 1 + angle * angle / 6 : angle / sin(angle));
+  for (int k = 0; k < 3; k++) out[k] = length * d[k];
+}
+
+/* Curvature vectors at both ends of the cubic with C(0) = 0, C'(0) = T0, C(1) = E, C'(1) = -T1:
+ * C''(0) = 6 E - 4 T0 + 2 T1, of which the part across T0 counts. */
+static void bend_edge(features *f, uint32_t e) {
+  net_topology *t = f->t;
+  double chord[2][3], d[2][3], tangent[2][3];
+  if (f->open[2 * e] && f->open[2 * e + 1]) return;
+  for (uint32_t s = 0; s < 2; s++) {
+    end_chord(t, 2 * e + s, chord[s]);
+    memcpy(d[s], t->guide + 6 * (size_t)e + 3 * s, sizeof d[s]);
+  }
+  for (int s = 0; s < 2; s++)
+    if (f->open[2 * e + (uint32_t)s]) mirror(chord[s], d[!s], d[s]);
+  for (int s = 0; s < 2; s++) arc(chord[s], d[s], tangent[s]);
+  for (uint32_t s = 0; s < 2; s++) {
+    if (f->open[2 * e + s]) continue;
+    double *bend = t->bend + 6 * (size_t)e + 3 * s, square = vec_dot(tangent[s], tangent[s]);
+    for (int k = 0; k < 3; k++) bend[k] = (6 * chord[s][k] - 4 * tangent[s][k] + 2 * tangent[!s][k]) / square;
+    double along = vec_dot(bend, d[s]);
+    for (int k = 0; k < 3; k++) bend[k] -= along * d[s][k];
+  }
+}
+
+static void find_bends(features *f) {
+  net_topology *t = f->t;
+  for (uint32_t e = 0; e < t->edges; e++)
+    if (t->kind[e] == NET_CREASE) bend_edge(f, e);
+  for (uint32_t end = 0; end < 2 * t->edges; end++) {
+    uint32_t mate = f->mate[end];
+    if (mate == NET_NONE || mate < end) continue;
+    double *a = t->bend + 3 * (size_t)end, *b = t->bend + 3 * (size_t)mate;
+    for (int k = 0; k < 3; k++) a[k] = b[k] = 0.5 * (a[k] + b[k]);
+  }
+}
+
+/* ---- nodes -------------------------------------------------------------------------------------- */
+
+/* The constraint of the sector from end a to end b, counter-clockwise; NET_NONE: a side without crease. */
+static void constrain(const features *f, uint32_t a, uint32_t b, net_constraint *out) {
+  *out = (net_constraint){.kind = NET_FREE};
+  if (a == NET_NONE) {
+    a = b;
+    b = NET_NONE;
+  }
+  if (a == NET_NONE || f->open[a]) return;
+  uint32_t ends[2] = {a, b};
+  out->kind = NET_CREASED;
+  if (b != NET_NONE && f->mate[a] != b) {
+    double plane[3];
+    vec_cross(f->t->guide + 3 * (size_t)a, f->t->guide + 3 * (size_t)b, plane);
+    if (vec_norm(plane) > CUSP) out->kind = NET_CORNER;
+  }
+  for (size_t s = 0; s < (out->kind == NET_CORNER ? 2 : 1); s++) {
+    memcpy(out->d[s], f->t->guide + 3 * (size_t)ends[s], sizeof out->d[s]);
+    memcpy(out->k[s], f->t->bend + 3 * (size_t)ends[s], sizeof out->k[s]);
+  }
+}
+
+/* Half-edge with which the sectors of v are counted: the boundary, else the first crease. */
+static uint32_t sector_start(const features *f, uint32_t v) {
+  const net_topology *t = f->t;
+  uint32_t h = f->first[v];
+  if (is_on_boundary(f, v)) return h;
+  do {
+    if (t->kind[t->edge[h]] == NET_CREASE) return h;
+    h = t->twin[net_prev(h)];
+  } while (h != f->first[v]);
+  return h;
+}
+
+/* Sectors of v, from node on; the number of the next. node_vertex NULL: they are counted alone. */
+static uint32_t number_sectors(const features *f, uint32_t v, uint32_t node, uint32_t *node_vertex,
+                               uint32_t *node_first, net_constraint *constraint) {
+  net_topology *t = f->t;
+  uint32_t start = sector_start(f, v), h = start, begin = start, next;
+  for (bool more = true; more; h = next) {
+    if (node_vertex) t->node[h] = node;
+    uint32_t in = net_prev(h);
+    next = t->twin[in];
+    more = next != NET_NONE && next != start;
+    bool crease = t->kind[t->edge[in]] == NET_CREASE;
+    if (more && !crease) continue;
+    if (node_vertex) {
+      bool from_crease = t->kind[t->edge[begin]] == NET_CREASE;
+      node_vertex[node] = v;
+      node_first[node] = begin;
+      constrain(f, from_crease ? end_at_start(t, begin) : NET_NONE, crease ? end_at_end(t, in) : NET_NONE,
+                constraint + node);
+    }
+    node++;
+    begin = next;
+  }
+  return node;
+}
+
+static batten_status renumber_nodes(batten_context *ctx, features *f) {
+  net_topology *t = f->t;
+  uint32_t nodes = 0;
+  for (uint32_t v = 0; v < t->vertices; v++) nodes = number_sectors(f, v, nodes, NULL, NULL, NULL);
+  uint32_t *vertex = batten_alloc_array(ctx, nodes, sizeof *vertex);
+  uint32_t *first = vertex ? batten_alloc_array(ctx, nodes, sizeof *first) : NULL;
+  t->constraint = first ? batten_alloc_array(ctx, nodes, sizeof *t->constraint) : NULL;
+  if (!t->constraint) {
+    batten_free(ctx, first);
+    batten_free(ctx, vertex);
+    return BATTEN_E_NOMEM;
+  }
+  uint32_t node = 0;
+  for (uint32_t v = 0; v < t->vertices; v++) node = number_sectors(f, v, node, vertex, first, t->constraint);
+  batten_free(ctx, t->node_vertex);
+  batten_free(ctx, t->node_first);
+  t->node_vertex = vertex;
+  t->node_first = first;
+  t->nodes = nodes;
+  return BATTEN_OK;
+}
+
+static batten_status make_creases(batten_context *ctx, features *f, const unsigned char *is_crease) {
+  net_topology *t = f->t;
+  bool any = false;
+  for (uint32_t e = 0; e < t->edges; e++) {
+    if (!is_crease[e]) continue;
+    any = true;
+    t->kind[e] = NET_CREASE;
+    t->crease_edges += !is_boundary_edge(t, e);
+  }
+  if (!any) return BATTEN_OK;
+  t->bend = batten_alloc_array(ctx, t->edges, 6 * sizeof *t->bend);
+  if (!t->bend) return BATTEN_E_NOMEM;
+  for (size_t i = 0; i < 6 * t->edges; i++) t->bend[i] = 0;
+  for (uint32_t v = 0; v < t->vertices; v++) judge_vertex(f, v);
+  continue_ends(f);
+  for (uint32_t v = 0; v < t->vertices; v++) settle_corner(f, v);
+  find_bends(f);
+  return renumber_nodes(ctx, f);
+}
+
+/* ---- lines -------------------------------------------------------------------------------------- */
+
+/* Line edges meet in a vertex: one tangent for both, unless the line has a corner there, or a crease stands between
+ * them or tells the direction already. */
+static void guide_line(features *f, uint32_t a, uint32_t b) {
+  net_topology *t = f->t;
+  double tangent[3];
+  double *guide[2] = {t->guide + 3 * (size_t)a, t->guide + 3 * (size_t)b};
+  if (vec_norm(guide[0]) > 0 || vec_norm(guide[1]) > 0) return;
+  if (net_edge_node(t, a / 2, a % 2, 0) != net_edge_node(t, b / 2, b % 2, 0)) return;
+  if (chord_turn(t, a, b) > f->corner_angle || !circle_tangent(t, a, b, tangent)) return;
+  for (int k = 0; k < 3; k++) {
+    guide[0][k] = -tangent[k];
+    guide[1][k] = tangent[k];
+  }
+}
+
+static batten_status check_lines(batten_context *ctx, const batten_network_options *opt) {
+  if (opt->line_count && (!opt->line_starts || !opt->line_vertices))
+    return batten_fail(ctx, BATTEN_E_INVALID, "opt.%s: NULL; give %zu lines",
+                       opt->line_starts ? "line_vertices" : "line_starts", opt->line_count);
+  if (opt->line_count && opt->line_starts[0] != 0)
+    return batten_fail(ctx, BATTEN_E_INVALID, "opt.line_starts[0]: %zu; it must be 0", opt->line_starts[0]);
+  for (size_t i = 0; i < opt->line_count; i++)
+    if (opt->line_starts[i + 1] < opt->line_starts[i] || opt->line_starts[i + 1] - opt->line_starts[i] < 2)
+      return batten_fail(ctx, BATTEN_E_INVALID,
+                         "opt.line_starts[%zu]: %zu after %zu; a line has two vertices or more", i + 1,
+                         opt->line_starts[i + 1], opt->line_starts[i]);
+  return BATTEN_OK;
+}
+
+/* is_line [edges]: those seen. */
+static batten_status make_line(batten_context *ctx, features *f, const uint32_t *valence, const uint32_t *vertices,
+                               size_t from, size_t to, unsigned char *is_line) {
+  net_topology *t = f->t;
+  uint32_t head = NET_NONE, last = NET_NONE;
+  for (size_t i = from; i + 1 < to; i++) {
+    uint32_t a = vertices[i], b = vertices[i + 1], e = find_edge(f, valence, a, b);
+    if (e == NET_NONE)
+      return batten_fail(
+          ctx, BATTEN_E_INVALID,
+          "opt.line_vertices[%zu]: no edge from vertex %lu to vertex %lu; lines run along edges of the "
+          "mesh",
+          i + 1, (unsigned long)a, (unsigned long)b);
+    if (is_line[e])
+      return batten_fail(ctx, BATTEN_E_INVALID,
+                         "opt.line_vertices[%zu]: the edge from vertex %lu to vertex %lu is in a line already; give "
+                         "an edge to one line, once",
+                         i + 1, (unsigned long)a, (unsigned long)b);
+    is_line[e] = 1;
+    t->line_edges++;
+    uint32_t begin = 2 * e + (end_vertex(t, 2 * e) != a);
+    if (i == from) head = begin;
+    if (i > from) guide_line(f, last, begin);
+    last = begin ^ 1;
+  }
+  if (vertices[from] == vertices[to - 1]) guide_line(f, last, head);
+  return BATTEN_OK;
+}
+
+static batten_status make_lines(batten_context *ctx, features *f, const batten_network_options *opt,
+                                const uint32_t *valence, unsigned char *is_line) {
+  memset(is_line, 0, f->t->edges);
+  batten_status st = BATTEN_OK;
+  for (size_t i = 0; i < opt->line_count && st == BATTEN_OK; i++)
+    st = make_line(ctx, f, valence, opt->line_vertices, opt->line_starts[i], opt->line_starts[i + 1], is_line);
+  return st;
+}
+
+static uint32_t count_valences(const net_topology *t, uint32_t *valence) {
+  uint32_t most = 0;
+  memset(valence, 0, t->vertices * sizeof *valence);
+  for (size_t h = 0; h < 3 * t->faces; h++) {
+    uint32_t count = ++valence[t->triangles[h]];
+    most = count > most ? count : most;
+  }
+  return most;
+}
+
+batten_status net_features_make(batten_context *ctx, const batten_network_options *opt, net_topology *t) {
+  bool wanted = opt->crease_angle_deg > 0 || opt->crease_count || opt->line_count ||
+                (opt->boundary_curves && t->boundary_edges);
+  if (!wanted) return BATTEN_OK;
+  batten_status st = check_lines(ctx, opt);
+  if (st < 0) return st;
+  st = BATTEN_E_NOMEM;
+  features f = {.t = t, .corner_angle = opt->corner_angle_deg * RADIANS + SLACK};
+  unsigned char *is_chosen = NULL;
+  uint32_t *valence = batten_alloc_array(ctx, t->vertices, sizeof *valence);
+  if (!valence) goto done;
+  uint32_t most = count_valences(t, valence);
+  if (!(is_chosen = batten_alloc_array(ctx, t->edges, sizeof *is_chosen)) ||
+      !(f.first = batten_alloc_array(ctx, t->vertices, sizeof *f.first)) ||
+      !(f.mate = batten_alloc_array(ctx, 2 * t->edges, sizeof *f.mate)) ||
+      !(f.open = batten_alloc_array(ctx, 2 * t->edges, sizeof *f.open)) ||
+      !(f.ends = batten_alloc_array(ctx, (size_t)most + 1, sizeof *f.ends)) ||
+      !(f.straight = batten_alloc_array(ctx, (size_t)most + 1, sizeof *f.straight)) ||
+      !(t->guide = batten_alloc_array(ctx, t->edges, 6 * sizeof *t->guide)))
+    goto done;
+  memcpy(f.first, t->node_first, t->vertices * sizeof *f.first);
+  for (size_t i = 0; i < 6 * t->edges; i++) t->guide[i] = 0;
+  for (size_t i = 0; i < 2 * t->edges; i++) {
+    f.mate[i] = NET_NONE;
+    f.open[i] = 0;
+  }
+  st = find_creases(ctx, &f, opt, valence, is_chosen);
+  if (st == BATTEN_OK) st = make_creases(ctx, &f, is_chosen);
+  if (st == BATTEN_OK) st = make_lines(ctx, &f, opt, valence, is_chosen);
+done:
+  batten_free(ctx, f.straight);
+  batten_free(ctx, f.ends);
+  batten_free(ctx, f.open);
+  batten_free(ctx, f.mate);
+  batten_free(ctx, f.first);
+  batten_free(ctx, is_chosen);
+  batten_free(ctx, valence);
+  return st;
+}
