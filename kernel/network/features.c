@@ -17,10 +17,11 @@
 
 static const double RADIANS = 0.017453292519943295769;
 
-/* Tangents at the two sides of a sector say little of its plane when they are nearly opposite. Mates are made of ends
- * that turn by less than STRAIGHT, and of those below BENT (1 radian is 57 degrees) whose plane leaves the mean plane
- * of the sector's triangles by more than ASTRAY. */
-static const double STRAIGHT = 0.05, BENT = 0.5, ASTRAY = 0.5;
+/* Tangents at the two sides of a sector say little of its plane when they are nearly opposite; and where two creases
+ * meet at an angle, both sectors would have to lie in their plane, even if one is a wall across it. Mates are made of
+ * ends that turn by less than STRAIGHT, and of those that turn by less than BENT and whose plane leaves the mean
+ * plane of the sector's triangles by more than ASTRAY (radians: 3, 120, 45 degrees). */
+static const double STRAIGHT = 0.05, BENT = 2.1, ASTRAY = 0.8;
 
 /* Below this angle two tangents at a corner count as one. */
 static const double CUSP = 1e-6;
