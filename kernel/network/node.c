@@ -3,19 +3,25 @@
 
 #include <string.h>
 
+/* Takes what lies along w from u and brings the rest to length 1. */
+static bool orthogonal_unit(const double *w, double *u) {
+  double part = vec_dot(u, w);
+  for (int k = 0; k < 3; k++) u[k] -= part * w[k];
+  return vec_normalize(u);
+}
+
 void net_frame(const double w[3], const double *along, net_node *out) {
   double u[3] = {0};
   memset(out->x, 0, sizeof out->x);
   memcpy(out->w, w, sizeof out->w);
-  if (along) {
-    double part = vec_dot(along, w);
-    for (int k = 0; k < 3; k++) u[k] = along[k] - part * w[k];
-  }
-  if (!along || !vec_normalize(u)) {
+  if (along) memcpy(u, along, sizeof u);
+  /* Twice, because of what the first round loses to cancellation. */
+  bool found = along && orthogonal_unit(w, u) && orthogonal_unit(w, u);
+  if (!found) {
     /* The axis that is farthest from w, made orthogonal: no division by anything small. */
     int axis = fabs(w[0]) <= fabs(w[1]) ? (fabs(w[0]) <= fabs(w[2]) ? 0 : 2) : (fabs(w[1]) <= fabs(w[2]) ? 1 : 2);
-    for (int k = 0; k < 3; k++) u[k] = (k == axis) - w[axis] * w[k];
-    vec_normalize(u);
+    for (int k = 0; k < 3; k++) u[k] = k == axis;
+    orthogonal_unit(w, u);
   }
   memcpy(out->u, u, sizeof u);
   vec_cross(w, u, out->v);

@@ -29,17 +29,14 @@ static bool direction_at(const double *chord, const double *normal, const double
   if (guide && vec_dot(guide, guide) > 0 && project(guide, normal, out)) return true;
   if (plane) {
     vec_cross(normal, plane, out);
-    if (vec_norm(out) > DIRECTION_MIN) {
-      vec_normalize(out);
-      double forward = vec_dot(out, chord);
-      if (forward < 0)
-        for (int k = 0; k < 3; k++) out[k] = -out[k];
-      if (forward != 0) return true;
-    }
-    project(chord, normal, out);
-    return false;
+    bool found = vec_norm(out) > DIRECTION_MIN && vec_normalize(out);
+    double forward = vec_dot(out, chord);
+    if (forward < 0)
+      for (int k = 0; k < 3; k++) out[k] = -out[k];
+    /* An edge along the normal has no forward in the plane. */
+    if (found && fabs(forward) > DIRECTION_MIN * vec_norm(chord)) return true;
   }
-  if (project(chord, normal, out)) return true;
+  if (project(chord, normal, out)) return !plane;
   if (fallback && project(fallback, normal, out)) return false;
   net_node any;
   net_frame(normal, NULL, &any);
