@@ -18,8 +18,8 @@ static const double *point(const net_topology *t, uint32_t half_edge) {
   return t->points + 3 * (size_t)t->triangles[half_edge];
 }
 
-static void half_ribbon(const net_topology *t, const net_node *nodes, const net_local *local, uint32_t h,
-                        net_ribbon *out) {
+void net_half_ribbon(const net_topology *t, const net_node *nodes, const net_local *local, uint32_t h,
+                     net_ribbon *out) {
   uint32_t e = t->edge[h], run = t->kind[e] == NET_CREASE ? h : t->half[e], last = net_next(run);
   unsigned turned = run != t->half[e];
   net_local along = local[e];
@@ -40,7 +40,7 @@ void net_facet_ribbons(const net_topology *t, const net_node *nodes, const net_l
   for (unsigned k = 0; k < 3; k++) {
     uint32_t h = (uint32_t)(3 * face + k);
     corner[k] = nodes[t->node[h]];
-    half_ribbon(t, nodes, local, h, &ribbon[k]);
+    net_half_ribbon(t, nodes, local, h, &ribbon[k]);
   }
 }
 

@@ -12,6 +12,10 @@ void net_ribbon_join(const double *vi, const double *vj, const net_node *i, cons
 /* Curvature vector of edge e at its start (end = 0) or end (1) if the curve is fixed there, else NULL. */
 const double *net_edge_bend(const net_topology *t, uint32_t e, unsigned end);
 
+/* Ribbon of the edge of half-edge h along it, with the field of its side. */
+void net_half_ribbon(const net_topology *t, const net_node *nodes, const net_local *local, uint32_t h,
+                     net_ribbon *out);
+
 /* How the derivative across edge k of a facet is made: the derivative towards the third corner is, for a point of the
  * facet that moves with the edge's, k(t) d(t) + h(t) C'(t). Positive k is regularity as far as the edge goes. */
 typedef struct net_across {

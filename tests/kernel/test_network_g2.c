@@ -1,0 +1,254 @@
+/* Optimised second order networks: against the integral itself, both solvers, invariances, constraints; the joints
+ * and curvatures of the surfaces that come of them. */
+#include "network_rig.h"
+
+#include "basis/triangular.h"
+
+static batten_context *ctx;
+
+static batten_network_options options(double power, double field) {
+  return (batten_network_options){
+      .normal_passes = 30, .normal_tol_rad = 1e-6, .weight_power = power, .field_weight = field};
+}
+
+/* Normals, then the network. */
+static net_figures build(network_rig *r) {
+  net_figures g1 = {0}, g2 = {0};
+  T_OK(net_g1(ctx, &r->topology, &r->options, r->normals, r->local, &g1), ctx);
+  T_OK(net_g2(ctx, &r->topology, &r->options, r->normals, r->nodes, r->local, &g2), ctx);
+  return g2;
+}
+
+/* K over 15 rows on each patch. */
+static void gauss_range(const network_rig *r, double range[2]) {
+  range[0] = INFINITY;
+  range[1] = -INFINITY;
+  for (size_t p = 0; p < 3 * r->topology.faces; p++) {
+    bool split = r->split[p / 3];
+    if (!split && p % 3) continue;
+    const double(*net)[3] = (const double(*)[3])(split ? r->thirds[p / 3][p % 3] : r->single[p / 3]);
+    for (int i = 0; i <= 15; i++)
+      for (int j = 0; i + j <= 15; j++) {
+        double s[6][3], n[3];
+        triangular_jet(split ? 6 : 7, net, i / 15., j / 15., 2, s);
+        vec_cross(s[1], s[2], n);
+        double k = vec_dot(n, s[3]) * vec_dot(n, s[5]) - vec_dot(n, s[4]) * vec_dot(n, s[4]);
+        k /= vec_dot(n, n) * vec_dot(n, n);
+        range[0] = fmin(range[0], k);
+        range[1] = fmax(range[1], k);
+      }
+  }
+}
+
+/* What a plain implementation of the method reaches, to its two digits: unweighted, and with edges weighted by their
+ * length. */
+static void reached(void) {
+  static const double paper[][2] = {{.903, 1.39}, {.335, 3.585}, {.979, 1.063},
+                                    {-1.10, .15}, {.925, 1.535}, {.03, 9.92}};
+  static const double weighted[][2] = {{.903, 1.39}, {.69, 1.732},  {.979, 1.063},
+                                       {-.80, .034}, {.925, 1.535}, {-.51, 12.2}};
+  static const char *names[] = {"octahedron", "shifted octahedron", "sphere 42", "graph", "tetrahedron", "ellipsoid"};
+  for (int w = 0; w < 2; w++)
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+      scene_mesh mesh = i == 0   ? scene_mesh_octahedron()
+                        : i == 1 ? scene_mesh_octahedron_shifted(.5, .3)
+                        : i == 2 ? scene_mesh_icosphere(2)
+                        : i == 3 ? scene_mesh_graph_7()
+                        : i == 4 ? scene_mesh_tetrahedron()
+                                 : scene_mesh_ellipsoid_long();
+      batten_network_options o = w ? options(3, .32) : options(0, .1);
+      network_rig r;
+      rig_open(ctx, mesh, &o, NULL, &r);
+      net_figures f = build(&r);
+      joint_figures j = rig_fill(&r, RIG_FALLBACK, 41);
+      double range[2];
+      gauss_range(&r, range);
+      const double *bound = w ? weighted[i] : paper[i];
+      T_RATIO(j.angle_deg, 1e-11, "%s: normals at joints, degrees", names[i]);
+      T_CHECK(r.refused == 0 && f.energy < f.energy_start && f.unknowns == 5 * r.topology.nodes,
+              "%s: energy %g from %g with %zu unknowns", names[i], f.energy, f.energy_start, f.unknowns);
+      T_CHECK(range[0] >= bound[0] && range[1] <= bound[1], "%s, weights %d: K from %.4f to %.4f, wanted %g to %g",
+              names[i], w, range[0], range[1], bound[0], bound[1]);
+      rig_close(&r);
+    }
+}
+
+/* ---- the integral ------------------------------------------------------------------------------- */
+
+/* Weighted int |C''|^2 + field_weight int |d''|^2 over all edges, from facets' ribbons at Gauss points, every edge's
+ * curve once, every field once (smooth edges) or on both sides (creases). */
+static double functional(const network_rig *r) {
+  static const double place[3] = {0.1127016653792583, 0.5, 0.8872983346207417},
+                      weight[3] = {5. / 18, 4. / 9, 5. / 18};
+  static const double place5[4] = {0.0694318442029737, 0.3300094782075719, 0.6699905217924281, 0.9305681557970263};
+  static const double weight5[4] = {0.1739274225687269, 0.3260725774312731, 0.3260725774312731, 0.1739274225687269};
+  const net_topology *t = &r->topology;
+  double sum = 0;
+  for (size_t f = 0; f < t->faces; f++) {
+    net_node node[3];
+    net_ribbon ribbon[3];
+    net_facet_ribbons(t, r->nodes, r->local, f, node, ribbon);
+    for (size_t k = 0; k < 3; k++) {
+      uint32_t h = (uint32_t)(3 * f + k), e = t->edge[h];
+      bool first = t->half[e] == h, field = first || t->kind[e] == NET_CREASE;
+      double part = 0;
+      for (int i = 0; i < 4 && first; i++)
+        for (int x = 0; x < 3; x++) {
+          double s = place5[i], q = 1 - s, (*c)[3] = ribbon[k].c, second = 0;
+          double b[4] = {q * q * q, 3 * q * q * s, 3 * q * s * s, s * s * s};
+          for (int m = 0; m < 4; m++) second += 20 * b[m] * (c[m + 2][x] - 2 * c[m + 1][x] + c[m][x]);
+          part += weight5[i] * second * second;
+        }
+      for (int i = 0; i < 3 && field; i++)
+        for (int x = 0; x < 3; x++) {
+          double s = place[i], (*d)[3] = ribbon[k].d;
+          double second = 6 * ((1 - s) * (d[2][x] - 2 * d[1][x] + d[0][x]) + s * (d[3][x] - 2 * d[2][x] + d[1][x]));
+          part += r->options.field_weight * weight[i] * second * second;
+        }
+      sum += part * pow(vec_distance(ribbon[k].c[0], ribbon[k].c[5]), -r->options.weight_power);
+    }
+  }
+  return sum;
+}
+
+/* The integral is quadratic: along each free direction of each node its differences give slope and bend exactly. */
+static double largest_slope(network_rig *r) {
+  double worst = 0;
+  for (size_t i = 0; i < r->topology.nodes; i++) {
+    double origin[5], columns[5][5], keep[5];
+    unsigned dof;
+    net_node_freedom(r->topology.constraint ? &r->topology.constraint[i] : NULL, &r->nodes[i], origin, columns, &dof);
+    memcpy(keep, r->nodes[i].x, sizeof keep);
+    for (unsigned y = 0; y < dof; y++) {
+      double value[3];
+      for (int s = 0; s < 3; s++) {
+        for (int k = 0; k < 5; k++) r->nodes[i].x[k] = keep[k] + 0.5 * (s - 1) * columns[k][y];
+        value[s] = functional(r);
+      }
+      memcpy(r->nodes[i].x, keep, sizeof keep);
+      double slope = value[2] - value[0], bend = value[2] - 2 * value[1] + value[0];
+      worst = fmax(worst, fabs(slope) / sqrt(bend * value[1]));
+      if (!(bend > 0)) worst = INFINITY;
+    }
+  }
+  return worst;
+}
+
+static void stationary(void) {
+  const struct {
+    const char *name;
+    scene_mesh mesh;
+    batten_network_direction direction;
+    batten_network_length length;
+  } all[] = {{"shifted octahedron", scene_mesh_octahedron_shifted(.5, .3), BATTEN_DIRECTION_D2, BATTEN_LENGTH_L2},
+             {"octahedron, D1 and L1", scene_mesh_octahedron_shifted(.3, .3), BATTEN_DIRECTION_D1, BATTEN_LENGTH_L1},
+             {"octahedron, L4", scene_mesh_octahedron_shifted(.2, .1), BATTEN_DIRECTION_D2, BATTEN_LENGTH_L4},
+             {"graph", scene_mesh_graph(4), BATTEN_DIRECTION_D2, BATTEN_LENGTH_L2},
+             {"ears", scene_mesh_ears(3), BATTEN_DIRECTION_D2, BATTEN_LENGTH_L2}};
+  for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
+    batten_network_options o = options(i % 2 ? 3 : 1.5, .2);
+    network_rig r;
+    o.direction = all[i].direction;
+    o.length = all[i].length;
+    rig_open(ctx, all[i].mesh, &o, NULL, &r);
+    net_figures f = build(&r);
+    T_RATIO(fabs(f.energy / functional(&r) - 1), 1e-13, "%s: the integral by quadrature, %g", all[i].name, f.energy);
+    T_RATIO(largest_slope(&r), 1e-10, "%s: slope of the integral along each unknown", all[i].name);
+    rig_close(&r);
+  }
+}
+
+/* ---- second routes ------------------------------------------------------------------------------ */
+
+static double difference(const network_rig *a, const network_rig *b) {
+  double worst = 0;
+  for (size_t f = 0; f < a->topology.faces; f++)
+    for (int k = 0; k < 36; k++) worst = fmax(worst, vec_distance(a->single[f][k], b->single[f][k]));
+  return worst;
+}
+
+static void same_by_other_ways(void) {
+  batten_network_options o = options(3, .32);
+  network_rig direct, other;
+  rig_open(ctx, scene_mesh_graph_7(), &o, NULL, &direct);
+  build(&direct);
+  rig_fill(&direct, RIG_7, 2);
+  o.solver = BATTEN_NETWORK_CG;
+  rig_open(ctx, scene_mesh_graph_7(), &o, NULL, &other);
+  net_figures f = build(&other);
+  rig_fill(&other, RIG_7, 2);
+  T_RATIO(difference(&direct, &other), 1e-11, "conjugate gradients, %zu iterations", f.cg_iterations);
+  T_RATIO((double)f.cg_iterations, 60, "iterations");
+  rig_close(&other);
+
+  batten_context *three = t_context(NULL, NULL, 3);
+  o.solver = BATTEN_NETWORK_AUTO;
+  rig_open(three, scene_mesh_graph_7(), &o, NULL, &other);
+  net_figures g1 = {0}, g2 = {0};
+  net_g1(three, &other.topology, &o, other.normals, other.local, &g1);
+  net_g2(three, &other.topology, &o, other.normals, other.nodes, other.local, &g2);
+  rig_fill(&other, RIG_7, 2);
+  T_CHECK(difference(&direct, &other) == 0, "the same bits with 3 threads");
+  rig_close(&other);
+  batten_context_free(three);
+
+  /* Turned by 90 degrees about z, and half as large. */
+  scene_mesh turned = scene_mesh_graph_7();
+  for (size_t v = 0; v < turned.vertices; v++) {
+    double *p = turned.points + 3 * v, x = p[0];
+    p[0] = -0.5 * p[1];
+    p[1] = 0.5 * x;
+    p[2] *= 0.5;
+  }
+  rig_open(ctx, turned, &o, NULL, &other);
+  build(&other);
+  rig_fill(&other, RIG_7, 2);
+  for (size_t i = 0; i < 36 * other.topology.faces; i++) {
+    double *p = other.single[0][i], x = p[0];
+    p[0] = 2 * p[1];
+    p[1] = -2 * x;
+    p[2] *= 2;
+  }
+  T_RATIO(difference(&direct, &other), 1e-10, "turned and halved");
+  rig_close(&other);
+  rig_close(&direct);
+
+  rig_open(ctx, scene_mesh_plane(4), &o, NULL, &other);
+  build(&other);
+  double most = 0;
+  for (size_t i = 0; i < other.topology.nodes; i++)
+    for (int k = 0; k < 5; k++) most = fmax(most, fabs(other.nodes[i].x[k]));
+  T_RATIO(most, 1e-12, "a plane has neither slope nor curvature");
+  rig_close(&other);
+}
+
+/* ---- failures ----------------------------------------------------------------------------------- */
+
+static batten_status call(batten_context *other, void *arg) {
+  network_rig *r = arg;
+  net_figures f = {0};
+  return net_g2(other, &r->topology, &r->options, r->normals, r->nodes, r->local, &f);
+}
+
+static void failures(void) {
+  batten_network_options o = options(3, .32);
+  network_rig r;
+  o.length = BATTEN_LENGTH_L4;
+  rig_open(ctx, scene_mesh_octahedron_shifted(.5, .3), &o, NULL, &r);
+  t_fail_every_allocation("direct", call, &r);
+  t_cancel_every_progress("direct", call, &r);
+  r.options.solver = BATTEN_NETWORK_CG;
+  t_fail_every_allocation("conjugate gradients", call, &r);
+  t_cancel_every_progress("conjugate gradients", call, &r);
+  rig_close(&r);
+}
+
+int main(void) {
+  ctx = t_context(NULL, NULL, 1);
+  reached();
+  stationary();
+  same_by_other_ways();
+  failures();
+  batten_context_free(ctx);
+  return t_done();
+}
