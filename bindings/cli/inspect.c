@@ -163,7 +163,7 @@ static bool no_option(cli_request *q, int key, const char *value) {
 
 static int work(cli_request *q) {
   static const char *const kinds[] = {"unknown",           "points",  "mesh", "solid", "carrier",
-                                      "quadratic program", "document"};
+                                      "quadratic program", "network", "document"};
   cli_run run;
   if (!cli_run_open(&run, q->threads, 0, q->quiet)) return CLI_FAILED;
   run.input = q->input;
@@ -195,6 +195,7 @@ static int work(cli_request *q) {
       case BATTEN_FILE_QP:
         st = tell_qp(&run, q->input, print, &report);
         break;
+      case BATTEN_FILE_NETWORK:
       case BATTEN_FILE_DOCUMENT:
         break;
       case BATTEN_FILE_UNKNOWN:

@@ -18,7 +18,9 @@ typedef enum bx_format {
   BX_SVG,
   BX_JSON,
   BX_QPS, /* .qps .sif .mps */
-  BX_MAT
+  BX_MAT,
+  BX_STEP, /* .step .stp */
+  BX_IGES  /* .iges .igs */
 } bx_format;
 
 /* By the extension, in any case of letters; a last .gz is looked through when gz is not NULL, and then told. */
@@ -33,5 +35,6 @@ batten_status bx_read_mesh_from(bx_reader *r, bx_format format, batten_mesh **ou
 batten_status bx_load_solid_from(bx_reader *r, batten_solid **out);
 batten_status bx_load_carrier_from(bx_reader *r, batten_carrier **out);
 batten_status bx_read_qp_from(bx_reader *r, bx_format format, batten_qp_file *out);
+batten_status bx_read_network_from(bx_reader *r, batten_network **out);
 
 #endif

@@ -4,7 +4,7 @@
  * number of at most 15 digits with a small power of ten is one exact product or quotient. Otherwise a nearby double
  * is computed in floating point and then moved, one unit in the last place at a time, until the decimal lies between
  * the midpoints to its two neighbours; those comparisons are made in integers and therefore exact (Clinger 1990,
- * algorithm R). */
+ * algorithm R). Writing is done in whole numbers for numbers of everyday size, else by trial. */
 #include "number.h"
 
 #include <assert.h>
@@ -250,7 +250,7 @@ static void normalise_point(char *text) {
   *to = '\0';
 }
 
-int bx_format_number(double value, char text[BX_NUMBER_SIZE]) {
+static int format_by_trial(double value, char text[BX_NUMBER_SIZE]) {
   for (int digits = 15; digits <= 17; digits++) {
     snprintf(text, BX_NUMBER_SIZE, "%.*g", digits, value);
     normalise_point(text);
@@ -259,4 +259,129 @@ int bx_format_number(double value, char text[BX_NUMBER_SIZE]) {
     if (bx_parse_number(text, &end, &back) == BX_NUMBER_OK && back == value) break;
   }
   return (int)strlen(text);
+}
+
+#ifdef __SIZEOF_INT128__
+__extension__ typedef unsigned __int128 wide;
+
+/* Digits of a number of everyday size in whole numbers: v = m 2^e is scaled by 10^k = 5^k 2^k so that 17 digits stand
+ * before the point; m 5^k is below 2^116, and the power of two is a shift. */
+typedef struct scaled {
+  uint64_t mantissa, whole; /* whole = v 10^k rounded down, 10^16 <= whole < 10^17 */
+  wide value, rest;         /* v 10^k = value 2^-shift; rest = value - whole 2^shift */
+  uint64_t power;           /* 5^k: a unit in the last place of v, as value counts */
+  int shift, exponent;      /* v = whole 10^(exponent-16) */
+} scaled;
+
+static bool scale(double v, scaled *s) {
+  int exponent2;
+  s->mantissa = take_apart(v, &exponent2);
+  if (!(v >= 1e-10 && v < 1e15)) return false; /* there 5^k has 63 bits at most, and shift is positive */
+  static const double powers[] = {1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1e0,  1e1, 1e2,
+                                  1e3,   1e4,  1e5,  1e6,  1e7,  1e8,  1e9,  1e10, 1e11, 1e12, 1e13, 1e14};
+  int low = 0, high = (int)(sizeof powers / sizeof powers[0]) - 1;
+  while (low < high) {
+    int middle = (low + high + 1) / 2;
+    if (v >= powers[middle])
+      low = middle;
+    else
+      high = middle - 1;
+  }
+  s->exponent = low - 10;
+  for (;;) { /* the negative powers are rounded: one step down may follow */
+    int k = 16 - s->exponent;
+    s->power = 1;
+    for (int i = 0; i < k; i++) s->power *= 5;
+    s->shift = -(exponent2 + k);
+    s->value = (wide)s->mantissa * s->power;
+    s->whole = (uint64_t)(s->value >> s->shift);
+    s->rest = s->value - ((wide)s->whole << s->shift);
+    if (s->whole >= 10000000000000000u || k == 27) break;
+    s->exponent--;
+  }
+  return s->whole >= 10000000000000000u && s->whole < 100000000000000000u;
+}
+
+/* v rounded to 17 less `fewer` digits, ties to even, as a multiple of 10^fewer. */
+static uint64_t round_digits(const scaled *s, int fewer) {
+  uint64_t unit = fewer == 2 ? 100 : fewer == 1 ? 10 : 1, q = s->whole / unit, r = s->whole % unit;
+  bool more, tie;
+  if (unit == 1) {
+    wide half = (wide)1 << (s->shift - 1);
+    more = s->rest > half;
+    tie = s->rest == half;
+  } else {
+    more = 2 * r > unit || (2 * r == unit && s->rest > 0);
+    tie = 2 * r == unit && s->rest == 0;
+  }
+  return (q + (more || (tie && (q & 1)))) * unit;
+}
+
+/* Is v the double next to the decimal? Half a unit in the last place either way, a quarter below powers of two. */
+static bool reads_back(const scaled *s, uint64_t rounded) {
+  wide there = (wide)rounded << s->shift;
+  bool below = there < s->value;
+  wide off = below ? s->value - there : there - s->value, allowed = s->power;
+  off *= below && s->mantissa == (uint64_t)1 << 52 ? 4 : 2;
+  return off < allowed || (off == allowed && !(s->mantissa & 1));
+}
+
+/* As "%.*g": fixed where the exponent is from -4 to below the number of digits. */
+static int put_digits(uint64_t rounded, int exponent, int digits, bool negative, char *text) {
+  char figures[20], *at = text;
+  int count = 0;
+  if (rounded >= 100000000000000000u) { /* rounding has carried to a digit more */
+    rounded /= 10;
+    exponent++;
+  }
+  for (int i = 16; i >= 0; i--, rounded /= 10) {
+    figures[i] = (char)('0' + rounded % 10);
+    if (count == 0 && figures[i] != '0') count = i + 1;
+  }
+  if (negative) *at++ = '-';
+  if (exponent < -4 || exponent >= digits) {
+    *at++ = figures[0];
+    if (count > 1) *at++ = '.';
+    for (int i = 1; i < count; i++) *at++ = figures[i];
+    int size = exponent < 0 ? -exponent : exponent;
+    *at++ = 'e';
+    *at++ = exponent < 0 ? '-' : '+';
+    *at++ = (char)('0' + size / 10);
+    *at++ = (char)('0' + size % 10);
+  } else if (exponent < 0) {
+    *at++ = '0';
+    *at++ = '.';
+    for (int i = -1; i > exponent; i--) *at++ = '0';
+    for (int i = 0; i < count; i++) *at++ = figures[i];
+  } else {
+    for (int i = 0; i <= exponent || i < count; i++) {
+      if (i == exponent + 1) *at++ = '.';
+      *at++ = figures[i];
+    }
+  }
+  *at = '\0';
+  return (int)(at - text);
+}
+
+int bx_format_number(double value, char text[BX_NUMBER_SIZE]) {
+  scaled s;
+  if (!scale(fabs(value), &s)) return format_by_trial(value, text);
+  int fewer = 2;
+  uint64_t rounded = round_digits(&s, fewer);
+  while (fewer > 0 && !reads_back(&s, rounded)) rounded = round_digits(&s, --fewer);
+  return put_digits(rounded, s.exponent, 17 - fewer, value < 0, text);
+}
+#else
+int bx_format_number(double value, char text[BX_NUMBER_SIZE]) { return format_by_trial(value, text); }
+#endif
+
+int bx_format_real(double value, char text[BX_NUMBER_SIZE]) {
+  int length = bx_format_number(value, text), mantissa = 0;
+  bool point = false;
+  for (; mantissa < length && text[mantissa] != 'e'; mantissa++) point = point || text[mantissa] == '.';
+  if (mantissa < length) text[mantissa] = 'E';
+  if (point) return length;
+  memmove(text + mantissa + 1, text + mantissa, (size_t)(length - mantissa) + 1);
+  text[mantissa] = '.';
+  return length + 1;
 }

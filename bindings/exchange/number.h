@@ -24,4 +24,7 @@ enum { BX_NUMBER_SIZE = 32 };
 /* The shortest of 15, 16, 17 digits that reads back to the same bits; value is finite. Returns the length. */
 int bx_format_number(double value, char text[BX_NUMBER_SIZE]);
 
+/* The same as CAD files need it: always with a point, and a capital E. */
+int bx_format_real(double value, char text[BX_NUMBER_SIZE]);
+
 #endif

@@ -144,6 +144,43 @@ static void test_random(void) {
   T_CHECK(!strcmp(text, "-0"), "minus zero: %s", text);
 }
 
+/* The same text as printf's with the least of 15, 16, 17 digits that reads back; the locale is C here. */
+static bool as_printed(double value) {
+  char text[BX_NUMBER_SIZE], printed[64];
+  int length = bx_format_number(value, text);
+  for (int digits = 15; digits <= 17; digits++) {
+    snprintf(printed, sizeof printed, "%.*g", digits, value);
+    if (strtod(printed, NULL) == value) break;
+  }
+  bool equal = !strcmp(text, printed) && (size_t)length == strlen(text);
+  if (!equal) printf("# %s, printf has %s\n", text, printed);
+  return equal;
+}
+
+static void test_everyday(void) {
+  uint64_t seed = 7;
+  size_t bad = 0;
+  enum { N = 100000 };
+  for (int i = 0; i < N; i++) {
+    double size = ldexp(1 + t_uniform(&seed), (int)(t_random(&seed) % 100) - 45), value = i & 1 ? -size : size;
+    bad += !as_printed(value);                                                              /* all bits */
+    bad += !as_printed(nearbyint(value * 4096) / 4096);                                     /* few bits: ties */
+    bad += !as_printed((double)(t_random(&seed) % 100000000) / pow(10, i % 17));            /* few digits */
+    bad += !as_printed(nextafter((double)(t_random(&seed) % 1000) / 1000, i & 1 ? 2 : -2)); /* next to few digits */
+  }
+  T_CHECK(bad == 0, "%d numbers of everyday size are written as printf would (seed 7), %zu differ", 4 * N, bad);
+  bad = 0;
+  for (int e = -60; e <= 60; e++) {
+    char power[8];
+    snprintf(power, sizeof power, "1e%d", e / 3);
+    double values[2] = {ldexp(1, e), strtod(power, NULL)};
+    for (int i = 0; i < 2; i++)
+      for (int side = 0; side < 3; side++)
+        bad += !as_printed(side ? nextafter(values[i], side * 1e99 - 1e99) : values[i]);
+  }
+  T_CHECK(bad == 0, "so are powers of 2 and 10 and their neighbours, %zu differ", bad);
+}
+
 static void test_integer(void) {
   static const struct {
     const char *text;
@@ -168,6 +205,7 @@ int main(void) {
   test_by_hand();
   test_long();
   test_random();
+  test_everyday();
   test_integer();
   return t_done();
 }

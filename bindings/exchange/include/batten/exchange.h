@@ -120,6 +120,57 @@ BATTEN_API const char *batten_qp_status_word(batten_status status);
 BATTEN_API batten_status batten_read_qp_solution(batten_context *ctx, const batten_qp_file *file, const char *path,
                                                  batten_qp_solution *solution);
 
+/* ---- minimum norm networks ---------------------------------------------------------------------- */
+
+/* How a triangular patch becomes a surface of CAD files, which are quadrangular; all three are exact. */
+typedef enum batten_cad_form {
+  BATTEN_CAD_TRIMMED = 0, /* the parallelogram over the triangle, trimmed along its diagonal: one face a patch */
+  BATTEN_CAD_QUADS,       /* three quadrangles a patch, cut at the middles of its sides and its centre: no trimming */
+  BATTEN_CAD_DEGENERATE   /* a square with one side drawn together to the first corner, where it has no normal */
+} batten_cad_form;
+typedef enum batten_length_unit {
+  BATTEN_UNIT_MM = 0,
+  BATTEN_UNIT_CM,
+  BATTEN_UNIT_M,
+  BATTEN_UNIT_INCH
+} batten_length_unit;
+typedef enum batten_step_schema {
+  BATTEN_STEP_AP214 = 0, /* automotive_design */
+  BATTEN_STEP_AP242      /* managed_model_based_3d_engineering */
+} batten_step_schema;
+
+typedef struct batten_write_network_options {
+  size_t struct_size;
+  batten_length_unit unit;   /* STEP, IGES: what the coordinates are in. Default MM. */
+  batten_cad_form form;      /* STEP, IGES. Default TRIMMED. */
+  batten_step_schema schema; /* STEP. Default AP214. */
+  const char *name;          /* STEP, IGES: of the product, UTF-8; NULL = the file's name without its extension */
+  const char *time_stamp;    /* STEP, IGES: "2026-11-22T10:00:00"; NULL = "1970-01-01T00:00:00", so that the same
+                                surface gives the same bytes */
+  unsigned density;          /* meshes: segments of every edge, 1 .. 512. Default 8. */
+  double tolerance;          /* meshes: as in batten_tessellate_options, caller's unit. Default 0. */
+} batten_write_network_options;
+BATTEN_API batten_write_network_options batten_write_network_options_default(void);
+
+/* By extension:
+ *   .step .stp  ISO 10303-21. Faces are B-spline surfaces of the patches' degree named "face 17" by the triangle
+ *               ("face 17 part 2", "face 17 quad 2" where there are more), joined by shared edges and vertices. Closed
+ *               components become solids, with those inside them as voids, open ones shells. Patches must meet at
+ *               their corners and edges to 1e-9 of the size.
+ *   .iges .igs  the same faces as trimmed surfaces (entities 128, 126, 142, 144), which know of no solids
+ *   .json       {"batten": "network", "version": 1, ...}; reads back to the same bits
+ *   .vtu        Bezier triangles of VTK 9, exact
+ *   .ply .obj .off .stl .vtp   tessellated, see batten_network_tessellate
+ * Fails: IO, INVALID (unknown extension: lists the known; patches that do not meet, named by their triangles),
+ * TOO_LARGE, NOMEM, CANCELLED; what stood under the name is then as it was. */
+BATTEN_API batten_status batten_write_network(batten_context *ctx, const batten_network *network,
+                                              const batten_write_network_options *opt, const char *path);
+
+/* .json (also .gz) as batten_write_network makes it. Checks everything and names the place: "a.json:
+ * network.patches[17].control_points[3]: ..." (FORMAT). While it is parsed, its tree is in memory that is not the
+ * context's. Fails: IO, FORMAT, INVALID (unknown extension), NOMEM, TOO_LARGE, CANCELLED; *out untouched then. */
+BATTEN_API batten_status batten_read_network(batten_context *ctx, const char *path, batten_network **out);
+
 /* What a file holds, by extension and content; only as much is read as that takes. Fails: IO, FORMAT. */
 typedef enum batten_file_kind {
   BATTEN_FILE_UNKNOWN = 0,
@@ -128,6 +179,7 @@ typedef enum batten_file_kind {
   BATTEN_FILE_SOLID,
   BATTEN_FILE_CARRIER,
   BATTEN_FILE_QP,
+  BATTEN_FILE_NETWORK,
   BATTEN_FILE_DOCUMENT /* another batten JSON document */
 } batten_file_kind;
 BATTEN_API batten_status batten_file_identify(batten_context *ctx, const char *path, batten_file_kind *out);
