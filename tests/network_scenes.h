@@ -269,7 +269,8 @@ static inline double scene_blob_gauss(const double *u) {
   return sum / (square * square);
 }
 
-/* Torus about z of radii 2 and .8, n around the axis, m around the tube: K from -1.042 to .446. */
+/* Torus about z of radii 2 and .8: n rings (an even number) of m vertices, every other one turned by half a step, so
+ * that the triangles are isosceles: K from -1.042 to .446. */
 #define SCENE_TORUS_MAJOR 2.0
 #define SCENE_TORUS_MINOR 0.8
 static inline scene_mesh scene_mesh_torus(size_t n, size_t m) {
@@ -277,12 +278,13 @@ static inline scene_mesh scene_mesh_torus(size_t n, size_t m) {
   uint32_t *t = out.corners;
   for (size_t i = 0; i < n; i++)
     for (size_t j = 0; j < m; j++) {
-      double a = 2 * SCENE_PI * (double)i / (double)n, b = 2 * SCENE_PI * (double)j / (double)m;
+      double a = 2 * SCENE_PI * (double)i / (double)n, b = 2 * SCENE_PI * ((double)j + (i % 2 ? 0.5 : 0)) / (double)m;
       double r = SCENE_TORUS_MAJOR + SCENE_TORUS_MINOR * cos(b);
-      size_t x = (i + 1) % n, y = (j + 1) % m;
       scene_point_set(out.points + 3 * (i * m + j), r * cos(a), r * sin(a), SCENE_TORUS_MINOR * sin(b));
-      scene_triangle_set(t, i * m + j, x * m + j, x * m + y);
-      scene_triangle_set(t + 3, i * m + j, x * m + y, i * m + y);
+      size_t near = i * m + j, far = (i + 1) % n * m + j;
+      size_t near_next = i * m + (j + 1) % m, far_next = (i + 1) % n * m + (j + 1) % m;
+      scene_triangle_set(t, near, far, i % 2 ? far_next : near_next);
+      scene_triangle_set(t + 3, i % 2 ? near : far, far_next, near_next);
       t += 6;
     }
   return out;
