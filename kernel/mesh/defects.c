@@ -186,11 +186,13 @@ batten_status batten_mesh_mark_triangles(batten_context *ctx, size_t vertex_coun
 
 typedef struct scratch {
   uint32_t *order;      /* [3 F] half-edges, those of one edge together */
-  uint32_t *corner;     /* [3 F] disjoint sets: fans */
+  uint32_t *corner;     /* [3 F] disjoint sets: fans; then corners after welding */
   uint32_t *first;      /* [F] */
-  uint32_t *kept;       /* [V], later the number of fans */
+  uint32_t *kept;       /* [V] */
+  uint32_t *fans;       /* [V] */
   unsigned char *marks; /* [F] */
   unsigned char *used;  /* [V] */
+  unsigned char *alone; /* [3 F] non-zero: the only half-edge of its edge */
 } scratch;
 
 static int takes_part(const scratch *s, uint32_t h) {
@@ -223,35 +225,75 @@ static int is_same_edge(const uint32_t *triangles, uint32_t g, uint32_t h) {
   return (a == c && b == e) || (a == e && b == c);
 }
 
-static void judge_edges(size_t triangle_count, const uint32_t *triangles, scratch *s, batten_mesh_defects *d) {
-  size_t half_edges = 3 * triangle_count, alive = 0;
+/* Those of order that take part are left; their number. */
+static size_t drop_others(size_t half_edges, scratch *s) {
+  size_t alive = 0;
   for (size_t i = 0; i < half_edges; i++)
     if (takes_part(s, s->order[i])) s->order[alive++] = s->order[i];
+  return alive;
+}
+
+static size_t edge_length(const uint32_t *corners, const uint32_t *run, size_t most) {
+  size_t n = 1;
+  while (n < most && is_same_edge(corners, run[0], run[n])) n++;
+  return n;
+}
+
+static void judge_edges(size_t triangle_count, const uint32_t *triangles, scratch *s, batten_mesh_defects *d) {
+  size_t alive = drop_others(3 * triangle_count, s);
   for (size_t i = 0, n; i < alive; i += n) {
-    n = 1;
-    while (i + n < alive && is_same_edge(triangles, s->order[i], s->order[i + n])) n++;
+    n = edge_length(triangles, s->order + i, alive - i);
+    for (size_t k = 0; k < n; k++) s->alone[s->order[i + k]] = n == 1;
     judge_edge(triangles, s->order + i, n, s, d);
   }
 }
 
 static void judge_fans(size_t vertex_count, size_t triangle_count, const uint32_t *triangles, scratch *s,
                        batten_mesh_defects *d) {
-  uint32_t *fans = s->kept;
-  for (size_t v = 0; v < vertex_count; v++) fans[v] = 0;
+  for (size_t v = 0; v < vertex_count; v++) s->fans[v] = 0;
   for (uint32_t h = 0; h < 3 * triangle_count; h++)
-    if (takes_part(s, h) && s->corner[h] == h) fans[triangles[h]]++;
+    if (takes_part(s, h) && s->corner[h] == h) s->fans[triangles[h]]++;
   for (size_t v = 0; v < vertex_count; v++)
-    if (fans[v] > 1 && !d->nonmanifold_vertices++) d->nonmanifold_vertex = v;
+    if (s->fans[v] > 1 && !d->nonmanifold_vertices++) d->nonmanifold_vertex = v;
 }
 
 static void judge_vertices(size_t vertex_count, const scratch *s, batten_mesh_defects *d) {
-  for (size_t v = 0; v < vertex_count; v++) {
+  for (size_t v = 0; v < vertex_count; v++)
     if (!s->used[v] && !d->isolated_vertices++) d->isolated_vertex = v;
-    if (s->kept[v] != v && !d->duplicate_vertices++) {
-      d->duplicate_vertex[0] = s->kept[v];
-      d->duplicate_vertex[1] = (uint32_t)v;
-    }
+}
+
+/* Vertices at one place may be meant: closed parts that touch, or the fans of one vertex that were split. They are
+ * not where an open edge lies upon another edge: s->fans marks those. */
+static batten_status judge_places(batten_context *ctx, size_t vertex_count, size_t triangle_count,
+                                  const uint32_t *triangles, scratch *s, batten_mesh_defects *d) {
+  size_t half_edges = 3 * triangle_count, shared = 0;
+  for (size_t v = 0; v < vertex_count; v++) {
+    s->fans[v] = 0;
+    shared += s->kept[v] != v;
   }
+  if (!shared) return BATTEN_OK;
+  uint32_t *welded = s->corner;
+  for (size_t h = 0; h < half_edges; h++) welded[h] = s->kept[triangles[h]];
+  batten_status st = batten_mesh_sort_edges(ctx, vertex_count, triangle_count, welded, s->order);
+  if (st < 0) return st;
+  size_t alive = drop_others(half_edges, s);
+  for (size_t i = 0, n; i < alive; i += n) {
+    const uint32_t *run = s->order + i;
+    n = edge_length(welded, run, alive - i);
+    int open = 0, several = 0;
+    for (size_t k = 0; k < n; k++) {
+      open |= s->alone[run[k]];
+      several |= !is_same_edge(triangles, run[0], run[k]);
+    }
+    for (size_t k = 0; k < n && open && several; k++)
+      s->fans[triangles[run[k]]] = s->fans[triangles[mesh_next(run[k])]] = 1;
+  }
+  for (uint32_t v = 0; v < vertex_count; v++)
+    if (s->fans[v] && s->kept[v] != v && !d->duplicate_vertices++) {
+      d->duplicate_vertex[0] = s->kept[v];
+      d->duplicate_vertex[1] = v;
+    }
+  return BATTEN_OK;
 }
 
 static void judge_triangles(size_t triangle_count, const scratch *s, batten_mesh_defects *d) {
@@ -285,6 +327,8 @@ batten_status batten_mesh_find_defects_of(batten_context *ctx, size_t vertex_cou
       !(s.corner = batten_alloc_array(ctx, half_edges, sizeof *s.corner)) ||
       !(s.first = batten_alloc_array(ctx, triangle_count, sizeof *s.first)) ||
       !(s.kept = batten_alloc_array(ctx, vertex_count, sizeof *s.kept)) ||
+      !(s.fans = batten_alloc_array(ctx, vertex_count, sizeof *s.fans)) ||
+      !(s.alone = batten_alloc_array(ctx, half_edges, sizeof *s.alone)) ||
       !(s.marks = batten_alloc_array(ctx, triangle_count, sizeof *s.marks)) ||
       !(s.used = batten_alloc_array(ctx, vertex_count, sizeof *s.used)))
     goto done;
@@ -299,10 +343,13 @@ batten_status batten_mesh_find_defects_of(batten_context *ctx, size_t vertex_cou
   judge_triangles(triangle_count, &s, &d);
   judge_edges(triangle_count, triangles, &s, &d);
   judge_fans(vertex_count, triangle_count, triangles, &s, &d);
-  *out = d;
+  st = judge_places(ctx, vertex_count, triangle_count, triangles, &s, &d);
+  if (st == BATTEN_OK) *out = d;
 done:
   batten_free(ctx, s.used);
   batten_free(ctx, s.marks);
+  batten_free(ctx, s.alone);
+  batten_free(ctx, s.fans);
   batten_free(ctx, s.kept);
   batten_free(ctx, s.first);
   batten_free(ctx, s.corner);

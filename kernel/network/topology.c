@@ -17,7 +17,7 @@ typedef struct scratch {
   uint32_t *mark;   /* [V] half-edge that ends here; valid when it starts at the vertex in hand */
 } scratch;
 
-/* False when the mesh needs repair: no area, or no triangles at a vertex. */
+/* False when a triangle has no area, or a vertex no triangle. */
 static bool sort_corners(const net_topology *t, scratch *s) {
   double size = batten_mesh_size(t->vertices, t->points);
   bool good = true;
@@ -119,10 +119,16 @@ static batten_status has_duplicate_place(batten_context *ctx, const net_topology
   return BATTEN_OK;
 }
 
-static batten_status fail_defects(batten_context *ctx, const net_topology *t) {
+/* Names what is wrong. A mesh that is whole can still have vertices at one place, which may be meant or not. */
+static batten_status check_defects(batten_context *ctx, const net_topology *t, bool whole) {
+  bool duplicates = false;
   batten_mesh_defects defects;
-  batten_status st = batten_mesh_find_defects_of(ctx, t->vertices, t->points, t->faces, t->triangles, &defects);
-  return st < 0 ? st : batten_mesh_fail_defects(ctx, &defects);
+  batten_status st = BATTEN_OK;
+  if (whole) st = has_duplicate_place(ctx, t, t->node_vertex, &duplicates);
+  if (st < 0 || (whole && !duplicates)) return st;
+  st = batten_mesh_find_defects_of(ctx, t->vertices, t->points, t->faces, t->triangles, &defects);
+  if (st == BATTEN_OK && (!whole || defects.duplicate_vertices)) st = batten_mesh_fail_defects(ctx, &defects);
+  return st;
 }
 
 batten_status net_topology_make(batten_context *ctx, size_t vertices, const double *points, size_t faces,
@@ -142,13 +148,9 @@ batten_status net_topology_make(batten_context *ctx, size_t vertices, const doub
       !(t.node_vertex = batten_alloc_array(ctx, vertices, sizeof *t.node_vertex)) ||
       !(t.node_first = batten_alloc_array(ctx, vertices, sizeof *t.node_first)))
     goto done;
-  bool duplicates;
-  st = has_duplicate_place(ctx, &t, s.mark, &duplicates);
+  bool whole = sort_corners(&t, &s) && find_twins(&t, &s) && !has_duplicate(&t) && find_fans(&t, &s);
+  st = check_defects(ctx, &t, whole);
   if (st < 0) goto done;
-  if (duplicates || !sort_corners(&t, &s) || !find_twins(&t, &s) || has_duplicate(&t) || !find_fans(&t, &s)) {
-    st = fail_defects(ctx, &t);
-    goto done;
-  }
   st = BATTEN_E_NOMEM;
   size_t edges = count_edges(&t);
   if (!(t.half = batten_alloc_array(ctx, edges, sizeof *t.half)) ||

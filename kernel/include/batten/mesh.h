@@ -70,7 +70,8 @@ BATTEN_API batten_status batten_mesh_self_intersections(batten_context *ctx, con
  * UINT32_MAX, when there is none). */
 typedef struct batten_mesh_defects {
   size_t isolated_vertices, isolated_vertex;
-  size_t duplicate_vertices; /* at the place of an earlier one, both in use */
+  size_t duplicate_vertices; /* at the place of an earlier one, where an edge of one triangle alone lies upon another
+                                edge: welding would join triangles. (Parts may touch in a vertex, or closed ones) */
   uint32_t duplicate_vertex[2];
   size_t degenerate_triangles, degenerate_triangle;  /* a corner twice, or the corners on one line to rounding */
   size_t duplicate_triangles, duplicate_triangle[2]; /* the same three corners */
@@ -88,16 +89,18 @@ BATTEN_API batten_status batten_mesh_find_defects(batten_context *ctx, const bat
 
 typedef struct batten_mesh_repair_options {
   size_t struct_size;
-  double weld_radius; /* vertices nearer than this become one (the first), >= 0, caller's unit. Default 0: those at
-                         the same place. Negative: no welding */
+  double weld_radius; /* caller's unit; a vertex nearer than this to an earlier one that stays becomes the first
+                         such: none moves further. Default 0: those at the same place. Negative: no welding */
   int orient;         /* non-zero: triangles are turned so that neighbours agree and closed parts enclose a positive
-                         volume; parts that have no orientation (a Moebius strip) fail with INVALID. Default 1. */
+                         volume, of open ones as few as can be; parts that have no orientation (a Moebius strip) fail
+                         with INVALID. Default 1. */
   int split; /* non-zero: vertices whose triangles fall apart into fans become one for each fan. Default 1. */
 } batten_mesh_repair_options;
 BATTEN_API batten_mesh_repair_options batten_mesh_repair_options_default(void);
 typedef struct batten_mesh_repair_info {
   size_t welded_vertices, split_vertices, removed_vertices; /* removed: isolated */
   size_t removed_triangles;                                 /* degenerate or duplicate */
+  size_t swapped_edges; /* sides of triangles without area, swapped so that no slit opens where these were */
   size_t turned_triangles;
 } batten_mesh_repair_info;
 /* A mesh without the defects that can be mended; edges of more than two triangles cannot (INVALID, names the edge).
