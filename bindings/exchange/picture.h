@@ -42,7 +42,9 @@ double picture_text_width(double height, const char *text);
 
 /* ---- colours and numbers ---- */
 picture_color picture_srgb(unsigned hex); /* 0xrrggbb as linear light */
-picture_color picture_colormap(double t); /* t in [0, 1]; NaN gives grey */
+picture_color picture_colormap(batten_picture_map map, double t); /* t in [0, 1]; NaN gives grey */
+/* Part of a white stripe, 0 .. 1, about a value of which a pixel covers `width`: stripes as in BATTEN_MAP_STRIPES. */
+double picture_stripe(double value, double width);
 /* Ticks of [lower, upper]: at (first + i) * mantissa * 10^exponent, i < count, about `wanted` of them. */
 typedef struct picture_ticks {
   long long first;
@@ -70,12 +72,15 @@ typedef struct picture_camera {
 
 /* The mesh in the unit ball about its centre, z upwards, and its dots. */
 typedef struct picture_scene {
-  size_t vertex_count, triangle_count, dot_count;
+  size_t vertex_count, triangle_count, dot_count, line_count;
   const uint32_t *triangles;
   float *vertices; /* [V][3] */
   float *normals;  /* [V][3] */
-  float *tones;    /* [V] in [0, 1] or NaN; NULL without colours */
+  float *tones;    /* [V] in [0, 1] or NaN; NULL without colours. With stripes their values */
+  batten_picture_map map;
+  float period;    /* of the values of stripes, 0 = none */
   float *dots;     /* [dot_count][3] */
+  float *lines;    /* [line_count][2][3] */
   float dot_radius;
   float ground; /* height of the ground plane */
 } picture_scene;
@@ -95,6 +100,11 @@ batten_status picture_rasterize(batten_context *ctx, const picture_scene *scene,
  * the largest coordinate along d, -2 where there is nothing. turned [vertex_count][3] is work space. */
 void picture_depth_map(const picture_scene *scene, const float u[3], const float v[3], const float d[3], size_t size,
                        float *turned, float *map);
+/* Screen position in samples, and nearness. */
+void picture_project(const picture_camera *camera, unsigned samples, const float point[3], float screen[3]);
+/* Lines [count][2][3] of the scene, dark, width in pixels, where nothing of it is in front of them. */
+void picture_draw_lines(picture_image *image, const picture_buffer *buffer, const picture_camera *camera, size_t count,
+                        const float *lines, double width);
 batten_status picture_shade(batten_context *ctx, const picture_scene *scene, const picture_camera *camera,
                             const picture_buffer *buffer, picture_image *image);
 #endif

@@ -26,9 +26,31 @@ static picture_color oklab(double lightness, double a, double b) {
   return (picture_color){(float)fmin(1, fmax(0, r)), (float)fmin(1, fmax(0, g)), (float)fmin(1, fmax(0, blue))};
 }
 
-picture_color picture_colormap(double t) {
+/* Hues of full colour from red (0) to blue (1), a little softened: pure ones glare and hide the shading. */
+static picture_color rainbow(double t) {
+  double sector = 4 * t, c[3];
+  c[0] = fmin(1, fmax(0, 2 - sector));
+  c[1] = fmin(1, fmin(sector, 4 - sector) + 0.22 * t); /* pure blue is too dark to shade */
+  c[2] = fmin(1, fmax(0, sector - 2));
+  for (int k = 0; k < 3; k++) c[k] = srgb_to_linear(0.10 + 0.84 * c[k]);
+  return (picture_color){(float)c[0], (float)c[1], (float)c[2]};
+}
+
+double picture_stripe(double value, double width) {
+  double place = value - 0.25, inside = 0.25 - fabs(place - round(place)); /* distance into the white */
+  double part = width > 0 ? fmin(1, fmax(0, 0.5 + inside / width)) : inside >= 0;
+  double fade = fmin(1, fmax(0, (width - 0.4) / 0.6)); /* too narrow to be seen one by one */
+  return part + fade * (0.5 - part);
+}
+
+picture_color picture_colormap(batten_picture_map map, double t) {
   if (isnan(t)) return (picture_color){0.4f, 0.4f, 0.4f};
   t = fmin(1, fmax(0, t));
+  if (map == BATTEN_MAP_RAINBOW) return rainbow(t);
+  if (map == BATTEN_MAP_STRIPES) {
+    float level = (float)(0.012 + 0.84 * t);
+    return (picture_color){level, level, level};
+  }
   const double degree = 0.017453292519943295;
   /* 0.1: the strongest colour that sRGB holds all along the path. */
   double hue = (300 - 205 * t) * degree, chroma = 0.1;

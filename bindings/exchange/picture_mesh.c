@@ -51,6 +51,17 @@ batten_status picture_check_options(batten_context *ctx, const batten_picture_op
   if (!isfinite(o.color_lower) || !isfinite(o.color_upper) || o.color_lower > o.color_upper)
     return batten_fail(ctx, BATTEN_E_INVALID, "opt.color_lower, color_upper: %g, %g; must be finite and in order",
                        o.color_lower, o.color_upper);
+  if ((unsigned)o.color_map > BATTEN_MAP_STRIPES)
+    return batten_fail(ctx, BATTEN_E_INVALID, "opt.color_map: %d; must be BATTEN_MAP_LIGHTNESS, RAINBOW or STRIPES",
+                       (int)o.color_map);
+  if (o.edge_count && !o.edges)
+    return batten_fail(ctx, BATTEN_E_INVALID, "opt.edges: NULL with opt.edge_count = %zu", o.edge_count);
+  if (!batten_mul(o.edge_count, 6, &numbers))
+    return batten_fail(ctx, BATTEN_E_TOO_LARGE, "opt.edge_count: %zu is too many", o.edge_count);
+  bad = batten_first_nonfinite(numbers, o.edges);
+  if (bad < numbers)
+    return batten_fail(ctx, BATTEN_E_INVALID, "opt.edges[%zu][%zu]: coordinate %zu is not finite", bad / 6,
+                       bad / 3 % 2, bad % 3);
   *out = o;
   return BATTEN_OK;
 }
@@ -92,7 +103,7 @@ static int compare_doubles(const void *a, const void *b) {
 /* Range of the colours: the caller's, else from the 1st to the 99th percentile, so that a few spikes do not make the
  * rest one colour. */
 static batten_status color_range(batten_context *ctx, size_t count, batten_picture_options *o) {
-  if (o->color_lower < o->color_upper) return BATTEN_OK;
+  if (o->color_lower < o->color_upper || o->color_map == BATTEN_MAP_STRIPES) return BATTEN_OK;
   double *sorted = batten_alloc_array(ctx, count, sizeof *sorted);
   if (!sorted) return BATTEN_E_NOMEM;
   size_t n = 0;
@@ -115,6 +126,19 @@ static void scene_free(batten_context *ctx, picture_scene *s) {
   batten_free(ctx, s->normals);
   batten_free(ctx, s->tones);
   batten_free(ctx, s->dots);
+  batten_free(ctx, s->lines);
+}
+
+/* Given normals, scaled to length 1, replace the triangles' where there are any. */
+static void take_normals(size_t count, const double *given, double *normals) {
+  for (size_t i = 0; i < count; i++, given += 3, normals += 3) {
+    double largest = fmax(fabs(given[0]), fmax(fabs(given[1]), fabs(given[2])));
+    if (!(largest > 0) || !isfinite(given[0] + given[1] + given[2])) continue;
+    double x = given[0] / largest, y = given[1] / largest, z = given[2] / largest, length = sqrt(x * x + y * y + z * z);
+    normals[0] = x / length;
+    normals[1] = y / length;
+    normals[2] = z / length;
+  }
 }
 
 static batten_status scene_make(batten_context *ctx, const batten_mesh *mesh, batten_picture_options *o,
@@ -124,6 +148,9 @@ static batten_status scene_make(batten_context *ctx, const batten_mesh *mesh, ba
   picture_scene s = {.vertex_count = V,
                      .triangle_count = batten_mesh_triangle_count(mesh),
                      .dot_count = o->point_count,
+                     .line_count = o->edge_count,
+                     .map = o->color_map,
+                     .period = (float)(o->color_upper - o->color_lower),
                      .triangles = batten_mesh_triangles(mesh),
                      .ground = INFINITY};
   double *normals = batten_alloc_array(ctx, V, 3 * sizeof *normals);
@@ -132,8 +159,10 @@ static batten_status scene_make(batten_context *ctx, const batten_mesh *mesh, ba
   s.dots = batten_alloc_array(ctx, s.dot_count, 3 * sizeof *s.dots);
   s.tones = o->colors ? batten_alloc_array(ctx, V, sizeof *s.tones) : NULL;
   batten_status st = BATTEN_E_NOMEM;
-  if (!normals || !s.vertices || !s.normals || !s.dots || (o->colors && !s.tones)) goto done;
+  s.lines = batten_alloc_array(ctx, s.line_count, 6 * sizeof *s.lines);
+  if (!normals || !s.vertices || !s.normals || !s.dots || !s.lines || (o->colors && !s.tones)) goto done;
   st = batten_mesh_vertex_normals(ctx, mesh, normals);
+  if (o->normals) take_normals(V, o->normals, normals);
   if (st >= 0 && o->colors) st = color_range(ctx, V, o);
   if (st < 0) goto done;
   unit_ball ball = ball_of(V, vertices, o->up_axis);
@@ -141,9 +170,13 @@ static batten_status scene_make(batten_context *ctx, const batten_mesh *mesh, ba
     to_unit(&ball, vertices + 3 * i, s.vertices + 3 * i);
     for (size_t k = 0; k < 3; k++) s.normals[3 * i + k] = (float)normals[3 * i + ball.axis[k]];
     s.ground = fminf(s.ground, s.vertices[3 * i + 2]);
-    if (s.tones) s.tones[i] = (float)((o->colors[i] - o->color_lower) / (o->color_upper - o->color_lower));
+    if (s.tones)
+      s.tones[i] = (float)(o->color_map == BATTEN_MAP_STRIPES
+                               ? o->colors[i]
+                               : (o->colors[i] - o->color_lower) / (o->color_upper - o->color_lower));
   }
   for (size_t i = 0; i < s.dot_count; i++) to_unit(&ball, o->points + 3 * i, s.dots + 3 * i);
+  for (size_t i = 0; i < 2 * s.line_count; i++) to_unit(&ball, o->edges + 3 * i, s.lines + 3 * i);
   /* Dots cover a share of the surface, whatever their number, between just visible and not clumsy. */
   if (s.dot_count) s.dot_radius = fminf(0.016f, fmaxf(0.0035f, 0.3f / sqrtf((float)s.dot_count)));
   *out = s;
@@ -200,7 +233,7 @@ static void draw_color_bar(picture_image *im, const batten_picture_options *o, d
   double width = 1.2 * unit;
   for (size_t y = (size_t)top; y < (size_t)bottom; y++) {
     picture_mask_rectangle(im, x, (double)y, x + width, (double)y + 1);
-    picture_blend(im, picture_colormap((bottom - (double)y - 0.5) / (bottom - top)), 1);
+    picture_blend(im, picture_colormap(o->color_map, (bottom - (double)y - 0.5) / (bottom - top)), 1);
   }
   const picture_color ink = picture_srgb(0x2a2d33);
   picture_ticks ticks = picture_ticks_choose(o->color_lower, o->color_upper, 6);
@@ -243,7 +276,9 @@ batten_status batten_picture_mesh(batten_context *ctx, const batten_mesh *mesh, 
   picture_buffer buffer = {
       .width = (size_t)o.width * samples, .height = (size_t)o.height * samples, .samples = samples};
   double unit = fmax(7, fmin(o.width, o.height) / 52.0), top = o.title ? 3.4 * unit : 0;
-  double margin = 0.055 * fmin(o.width, o.height), bar = o.colors ? 7 * unit : 0;
+  double margin = 0.055 * fmin(o.width, o.height), bar = 0;
+  bool has_bar = o.colors && o.color_map != BATTEN_MAP_STRIPES;
+  if (has_bar) bar = 7 * unit;
   st = scene_make(ctx, mesh, &o, &scene);
   if (st < 0) return st;
   buffer.nearness = batten_alloc_array(ctx, buffer.width * buffer.height, sizeof *buffer.nearness);
@@ -257,7 +292,8 @@ batten_status batten_picture_mesh(batten_context *ctx, const batten_mesh *mesh, 
   st = picture_rasterize(ctx, &scene, &camera, &buffer);
   if (st >= 0) st = picture_shade(ctx, &scene, &camera, &buffer, &image);
   if (st < 0) goto done;
-  if (o.colors) draw_color_bar(&image, &o, o.width - bar, 0.25 * o.height, 0.75 * o.height, unit);
+  picture_draw_lines(&image, &buffer, &camera, scene.line_count, scene.lines, 0.085 * unit);
+  if (has_bar) draw_color_bar(&image, &o, o.width - bar, 0.25 * o.height, 0.75 * o.height, unit);
   if (o.title) {
     picture_mask_text(&image, 1.8 * unit, 3.2 * unit, 1.25 * unit, 1.15, o.title);
     picture_blend(&image, picture_srgb(0x2a2d33), 0.95);

@@ -21,7 +21,7 @@ typedef struct raster_job {
 
 static double dot3(const double a[3], const float b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-static void project(const picture_camera *c, unsigned samples, const float point[3], float screen[3]) {
+void picture_project(const picture_camera *c, unsigned samples, const float point[3], float screen[3]) {
   double distance = c->distance - dot3(c->back, point), scale = c->focal / distance * samples;
   screen[0] = (float)(c->center[0] * samples + scale * (dot3(c->right, point) - c->offset[0]));
   screen[1] = (float)(c->center[1] * samples - scale * (dot3(c->up, point) - c->offset[1]));
@@ -35,7 +35,7 @@ static void project_chunk(void *arg, size_t chunk) {
   size_t end = (chunk + 1) * PROJECT_CHUNK;
   if (end > job->scene->vertex_count) end = job->scene->vertex_count;
   for (size_t v = chunk * PROJECT_CHUNK; v < end; v++)
-    project(job->camera, job->buffer->samples, job->scene->vertices + 3 * v, job->buffer->screen + 3 * v);
+    picture_project(job->camera, job->buffer->samples, job->scene->vertices + 3 * v, job->buffer->screen + 3 * v);
 }
 
 /* ---- triangles ----------------------------------------------------------------------------------- */
@@ -108,7 +108,7 @@ static void draw_triangle(const target *t, const float *a, const float *b, const
 static void draw_dot(const raster_job *job, const target *t, size_t index) {
   const picture_scene *s = job->scene;
   float p[3];
-  project(job->camera, job->buffer->samples, s->dots + 3 * index, p);
+  picture_project(job->camera, job->buffer->samples, s->dots + 3 * index, p);
   if (!(p[2] > 0 && p[2] < 2)) return; /* far off the mesh: behind the camera, or in its face */
   double radius = s->dot_radius * job->camera->focal * p[2] * job->buffer->samples;
   size_t x0, x1, y0, y1;

@@ -147,6 +147,33 @@ static void face_normal(const picture_scene *s, const uint32_t v[3], float out[3
 /* 40 degrees: a triangle that leans so far from the mean of its corner's triangles is parted from them by an edge. */
 static const float crease_cosine = 0.766f;
 
+/* Shares of a triangle's corners in the place that is seen at a sample; in space, that is weighed by nearness. */
+static void corner_shares(const float *const p[3], float sx, float sy, float share[3]) {
+  float sum = 0;
+  for (size_t k = 0; k < 3; k++) {
+    const float *q = p[(k + 1) % 3], *r = p[(k + 2) % 3];
+    share[k] = ((r[0] - q[0]) * (sy - q[1]) - (r[1] - q[1]) * (sx - q[0])) * p[k][2];
+    sum += share[k];
+  }
+  for (size_t k = 0; k < 3; k++) share[k] = sum != 0 ? share[k] / sum : 1.0f / 3;
+}
+
+/* Part of white at a sample, from the values at the corners there and a pixel further right and down. */
+static float stripe_tone(const picture_scene *scene, const uint32_t v[3], const float *const p[3], float sx, float sy,
+                         unsigned samples) {
+  float at[3], value[3] = {0}, step = (float)samples;
+  for (size_t k = 0; k < 3; k++) {
+    at[k] = scene->tones[v[k]];
+    if (scene->period > 0) at[k] -= scene->period * roundf((at[k] - at[0]) / scene->period);
+  }
+  for (int i = 0; i < 3; i++) {
+    float share[3];
+    corner_shares(p, i == 1 ? sx + step : sx, i == 2 ? sy + step : sy, share);
+    for (size_t k = 0; k < 3; k++) value[i] += share[k] * at[k];
+  }
+  return (float)picture_stripe((double)value[0], (double)hypotf(value[1] - value[0], value[2] - value[0]));
+}
+
 static void surface_point(const shading *s, size_t x, size_t y, point *out) {
   const picture_buffer *b = s->buffer;
   const picture_scene *scene = s->scene;
@@ -162,22 +189,17 @@ static void surface_point(const shading *s, size_t x, size_t y, point *out) {
   } else {
     const uint32_t *v = scene->triangles + 3 * item;
     const float *p[3] = {b->screen + 3 * (size_t)v[0], b->screen + 3 * (size_t)v[1], b->screen + 3 * (size_t)v[2]};
-    float share[3], sum = 0, sx = (float)x + 0.5f, sy = (float)y + 0.5f;
-    for (size_t k = 0; k < 3; k++) {
-      const float *q = p[(k + 1) % 3], *r = p[(k + 2) % 3];
-      share[k] = ((r[0] - q[0]) * (sy - q[1]) - (r[1] - q[1]) * (sx - q[0])) * p[k][2]; /* perspective by 1/w */
-      sum += share[k];
-    }
-    float flat[3];
+    float share[3], flat[3], sx = (float)x + 0.5f, sy = (float)y + 0.5f;
+    corner_shares(p, sx, sy, share);
     face_normal(scene, v, flat);
     if (scene->tones) out->tone = 0;
     for (size_t k = 0; k < 3; k++) {
       const float *smooth = scene->normals + 3 * (size_t)v[k];
       const float *normal = dotf(smooth, flat) < crease_cosine ? flat : smooth;
-      share[k] = sum != 0 ? share[k] / sum : 1.0f / 3;
       if (scene->tones) out->tone += share[k] * scene->tones[v[k]];
       for (size_t j = 0; j < 3; j++) out->normal[j] += share[k] * normal[j];
     }
+    if (scene->map == BATTEN_MAP_STRIPES && scene->tones) out->tone = stripe_tone(scene, v, p, sx, sy, b->samples);
     /* Seen from behind: the inside of an open mesh. The side follows from the turn of the triangle on the screen. */
     float turn = (p[1][0] - p[0][0]) * (p[2][1] - p[0][1]) - (p[1][1] - p[0][1]) * (p[2][0] - p[0][0]);
     if (turn > 0) {
@@ -381,7 +403,7 @@ static void compose_row(void *arg, size_t y) {
       left -= p->weight;
       picture_color albedo = p->kind == 2      ? dot
                              : p->kind == 1    ? inside
-                             : s->scene->tones ? picture_colormap(p->tone)
+                             : s->scene->tones ? picture_colormap(s->scene->map, p->tone)
                                                : plain;
       /* Light from the ground, less where the thing is close to it. */
       float height = p->position[2] - s->scene->ground;

@@ -128,14 +128,25 @@ static void test_numbers(void) {
   double last = -1;
   bool rises = true;
   for (int i = 0; i <= 100; i++) {
-    picture_color c = picture_colormap(i / 100.0);
+    picture_color c = picture_colormap(BATTEN_MAP_LIGHTNESS, i / 100.0);
     double y = 0.2126 * (double)c.r + 0.7152 * (double)c.g + 0.0722 * (double)c.b;
     rises &= y > last;
     last = y;
   }
   T_CHECK(rises, "the colour map gets lighter all along, to %.2f", last);
-  picture_color grey = picture_colormap(NAN);
+  picture_color grey = picture_colormap(BATTEN_MAP_LIGHTNESS, NAN);
   T_CHECK(grey.r == grey.g && grey.g == grey.b, "not a number is grey");
+  picture_color low = picture_colormap(BATTEN_MAP_RAINBOW, 0), high = picture_colormap(BATTEN_MAP_RAINBOW, 1);
+  picture_color middle = picture_colormap(BATTEN_MAP_RAINBOW, 0.5);
+  T_CHECK(low.r > 4 * low.g && low.r > 4 * low.b && high.b > 4 * high.r && high.b > 4 * high.g &&
+              middle.g > 4 * middle.r && middle.g > 4 * middle.b,
+          "the rainbow goes from red over green to blue");
+  T_CHECK(picture_stripe(3.1, 0) > 0.9 && picture_stripe(3.6, 0) < 0.1 && picture_stripe(-0.1, 0) < 0.1 &&
+              picture_stripe(-0.9, 0) > 0.9,
+          "stripes are white from whole numbers to the next half");
+  T_RATIO(fabs(picture_stripe(7, 0.1) - 0.5), 1e-12, "a pixel on their edge has half of each");
+  T_RATIO(fabs(picture_stripe(7.02, 0.1) - 0.7), 1e-12, "and 0.2 of its width further 0.7");
+  T_RATIO(fabs(picture_stripe(0.3, 2) - 0.5), 1e-12, "stripes too narrow to be seen are grey");
 }
 
 /* The ball coloured by one value: its pixels are known by their colour, so its disc can be measured. */
@@ -172,6 +183,71 @@ static void test_ball(batten_context *ctx, const batten_mesh *ball) {
   free(colors);
 }
 
+/* A circle about the ball, at height z above its centre. */
+static void make_circle(double z, double lines[][6], size_t count) {
+  double radius = sqrt(4 - z * z);
+  for (size_t i = 0; i < count; i++)
+    for (size_t e = 0; e < 2; e++) {
+      double a = 2 * 3.14159265358979 * (double)(i + e) / (double)count;
+      lines[i][3 * e] = 3 + radius * cos(a), lines[i][3 * e + 1] = 4 + radius * sin(a), lines[i][3 * e + 2] = 5 + z;
+    }
+}
+
+/* Pixels of the ball's disc that are darker by far than in the other picture. */
+static size_t count_darker(const pixels *p, const pixels *than) {
+  size_t count = 0;
+  for (size_t i = 0; i < (size_t)p->width * p->height; i++) count += p->rgb[3 * i + 1] + 30 < than->rgb[3 * i + 1];
+  return count;
+}
+
+/* What networks are shown with: normals, lines, stripes. */
+static void test_surface(batten_context *ctx, const batten_mesh *ball) {
+  enum { PIECES = 200 };
+  static double lines[PIECES][6];
+  size_t V = batten_mesh_vertex_count(ball);
+  const double *v = batten_mesh_vertices(ball);
+  double *normals = malloc(3 * V * sizeof *normals), *values = malloc(V * sizeof *values);
+  for (size_t i = 0; i < V; i++)
+    for (size_t k = 0; k < 3; k++) normals[3 * i + k] = 1e-200 * (v[3 * i + k] - 3 - (double)k);
+  batten_picture_options o = batten_picture_options_default();
+  o.width = 320, o.height = 240, o.normals = normals;
+  T_OK(batten_picture_mesh(ctx, ball, &o, path_a), ctx);
+  pixels plain = read_png(path_a);
+  o.edge_count = PIECES, o.edges = &lines[0][0];
+  make_circle(0, lines, PIECES);
+  T_OK(batten_picture_mesh(ctx, ball, &o, path_a), ctx);
+  pixels equator = read_png(path_a);
+  size_t drawn = count_darker(&equator, &plain);
+  T_CHECK(drawn > 100 && drawn < 600, "a line about the ball shows on its front: %zu pixels", drawn);
+  make_circle(-1.9, lines, PIECES); /* low: the camera looks from above */
+  T_OK(batten_picture_mesh(ctx, ball, &o, path_b), ctx);
+  pixels low = read_png(path_b);
+  drawn = count_darker(&low, &plain);
+  T_CHECK(drawn < 10, "a line that is behind it does not: %zu pixels", drawn);
+  for (size_t i = 0; i < V; i++)
+    values[i] = 2 * v[3 * i + 2]; /* from 6 to 14; the last black one, at the top, is beyond the horizon */
+  o.edge_count = 0, o.colors = values, o.color_map = BATTEN_MAP_STRIPES, o.elevation_deg = 0;
+  T_OK(batten_picture_mesh(ctx, ball, &o, path_a), ctx);
+  pixels zebra = read_png(path_a);
+  int stripes = 0, level = 0;
+  for (size_t y = 0; y < 240; y++) {
+    int green = zebra.rgb[3 * (y * 320 + 160) + 1], now = green > 130 ? 1 : green < 60 ? -1 : level;
+    stripes += now != level && now < 0;
+    level = now;
+  }
+  T_CHECK(stripes == 7, "7 black stripes down its middle: %d", stripes);
+  for (size_t i = 0; i < V; i++)
+    values[i] = fmod(values[i], 4) + (v[3 * i] > 3 ? 4 : 0); /* the same but for the period */
+  o.color_upper = 4;
+  T_OK(batten_picture_mesh(ctx, ball, &o, path_b), ctx);
+  pixels again = read_png(path_b);
+  size_t differ = 0;
+  for (size_t i = 0; i < 3 * 320 * 240; i++) differ += abs(again.rgb[i] - zebra.rgb[i]) > 3;
+  T_CHECK(differ == 0, "values that begin anew make the same stripes, %zu differ", differ);
+  free(plain.rgb), free(equator.rgb), free(low.rgb), free(zebra.rgb), free(again.rgb);
+  free(normals), free(values);
+}
+
 static batten_status draw_small(batten_context *ctx, void *arg) {
   (void)arg;
   batten_mesh *ball = make_ball(ctx, 5);
@@ -180,7 +256,9 @@ static batten_status draw_small(batten_context *ctx, void *arg) {
   o.width = 40, o.height = 30, o.title = "A & b", o.color_label = "z";
   o.points = batten_mesh_vertices(ball);
   o.point_count = 3;
-  o.colors = batten_mesh_vertices(ball);
+  o.colors = o.normals = batten_mesh_vertices(ball);
+  o.edges = batten_mesh_vertices(ball);
+  o.edge_count = 4;
   batten_status st = batten_picture_mesh(ctx, ball, &o, path_b);
   batten_mesh_free(ball);
   return st;
@@ -209,6 +287,12 @@ static void test_bad(batten_context *ctx, const batten_mesh *ball) {
   T_STATUS(batten_picture_mesh(ctx, ball, &o, path_a), BATTEN_E_INVALID, ctx, "opt.points[1]: coordinate 1");
   o = good, o.color_lower = 1;
   T_STATUS(batten_picture_mesh(ctx, ball, &o, path_a), BATTEN_E_INVALID, ctx, "in order");
+  o = good, o.edge_count = 1;
+  T_STATUS(batten_picture_mesh(ctx, ball, &o, path_a), BATTEN_E_INVALID, ctx, "opt.edges: NULL");
+  o.edges = bad;
+  T_STATUS(batten_picture_mesh(ctx, ball, &o, path_a), BATTEN_E_INVALID, ctx, "opt.edges[0][1]: coordinate 1");
+  o = good, o.color_map = (batten_picture_map)3;
+  T_STATUS(batten_picture_mesh(ctx, ball, &o, path_a), BATTEN_E_INVALID, ctx, "opt.color_map: 3");
   T_STATUS(batten_picture_mesh(ctx, ball, NULL, "ball.jpg"), BATTEN_E_INVALID, ctx, "use .png");
   T_STATUS(batten_picture_mesh(ctx, ball, NULL, "/nonexistent/ball.png"), BATTEN_E_IO, ctx, "/nonexistent/ball.png");
   batten_mesh *empty = NULL;
@@ -312,6 +396,7 @@ int main(void) {
   test_mask(ctx);
   test_numbers();
   test_ball(ctx, ball);
+  test_surface(ctx, ball);
   test_odd(ctx);
   test_bad(ctx, ball);
   test_ring(ctx);

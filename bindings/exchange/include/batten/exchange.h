@@ -186,6 +186,14 @@ BATTEN_API batten_status batten_file_identify(batten_context *ctx, const char *p
 
 /* ---- pictures ----------------------------------------------------------------------------------- */
 
+typedef enum batten_picture_map { /* what colours a scalar has */
+  BATTEN_MAP_LIGHTNESS = 0, /* dark blue over green to light yellow; keeps its order in grey and to the colour-blind */
+  BATTEN_MAP_RAINBOW,       /* hues, red at the lower end over yellow, green, cyan to blue at the upper, as the figures of
+                               Gaussian curvature have them in the paper on minimum norm networks */
+  BATTEN_MAP_STRIPES        /* zebra: white from whole numbers to the next half, black from there; for reflection lines.
+                               color_upper - color_lower, if not 0, is the period at which the scalar begins anew */
+} batten_picture_map;
+
 typedef struct batten_picture_options {
   size_t struct_size;
   unsigned width, height;  /* pixels, 16 .. 8192. Default 1200 x 900. */
@@ -195,9 +203,14 @@ typedef struct batten_picture_options {
   size_t point_count;      /* data points drawn as dots, 0 = none */
   const double *points;    /* [point_count][3], for outlines [point_count][2] */
   const double *colors;    /* mesh: [V] scalar shown by colour, NULL = plain; grey where not finite */
+  batten_picture_map color_map; /* Default LIGHTNESS. */
   double color_lower, color_upper; /* their range; equal = from the 1st to the 99th percentile. Default 0, 0. */
   const char *color_label; /* over the colour bar; NULL = none; ASCII */
   const char *title;       /* NULL = none; ASCII */
+  const double *normals;   /* mesh: [V][3] to shade with, any length; NULL and rows of zeros: from the triangles. For
+                              vertices that patches do not share */
+  size_t edge_count;       /* mesh: lines drawn on the surface where it is seen, 0 = none */
+  const double *edges;     /* [edge_count][2][3] their ends; each short against the surface's bends */
 } batten_picture_options;
 BATTEN_API batten_picture_options batten_picture_options_default(void);
 
