@@ -65,16 +65,15 @@ static spoke_curve curve_of(const peters_job *job, uint32_t node, net_spoke s) {
   return out;
 }
 
-/* The form (r, sqrt2 m, n) nearest to the curvatures of the curves, each by its derivative's length. */
+/* The form (r, sqrt2 m, n) with II(T_e, T_e) nearest to c_e: long curves count more than the angles between them. */
 static void fit_form(const peters_job *job, uint32_t node, const net_node *frame, double form[3]) {
   double a[9] = {0}, b[3] = {0}, values[3], vectors[9];
   for (net_spoke s = net_spoke_first(job->t, node); s.half != NET_NONE; s = net_spoke_next(job->t, s)) {
     spoke_curve c = curve_of(job, node, s);
-    double x = vec_dot(c.t, frame->u), y = vec_dot(c.t, frame->v), square = x * x + y * y;
-    if (!(square > 0)) continue;
-    double row[3] = {x * x / square, sqrt(2) * x * y / square, y * y / square};
+    double x = vec_dot(c.t, frame->u), y = vec_dot(c.t, frame->v);
+    double row[3] = {x * x, sqrt(2) * x * y, y * y};
     for (int i = 0; i < 3; i++) {
-      b[i] += row[i] * c.bend / square;
+      b[i] += row[i] * c.bend;
       for (int j = 0; j < 3; j++) a[3 * i + j] += row[i] * row[j];
     }
   }
