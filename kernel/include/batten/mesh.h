@@ -120,11 +120,12 @@ BATTEN_API batten_status batten_mesh_repair(batten_context *ctx, const batten_me
 BATTEN_API batten_status batten_mesh_smooth(batten_context *ctx, const batten_mesh *mesh, double noise,
                                             batten_mesh **out, double *lambda);
 
-/* Fewer triangles: edges are collapsed in the order of their quadric error [Garland, Heckbert 1997] until `triangles`
- * are left, but never where that would fold a triangle, pinch the surface or change its topology; boundaries keep
- * their shape. Fields are dropped. *distance_max (may be NULL) is the square root of the largest quadric error.
- * BATTEN_W_ACCURACY: no further edge may go. Progress phase "decimate". Fails: INVALID (also: not an oriented
- * manifold), NOMEM, CANCELLED. */
+/* Fewer triangles: edges are collapsed in the order of their quadric error [Garland, Heckbert 1997] until at most
+ * `triangles` are left, but never where that would fold a triangle, pinch the surface or change its topology;
+ * boundaries keep their shape. Fields are dropped. *distance_max (may be NULL) is the square root of the largest
+ * quadric error: a mean distance to the planes of the triangles that a vertex stands for. BATTEN_W_ACCURACY: no
+ * further edge may go. Progress phase "decimate". Fails: INVALID (also: not an oriented manifold), NOMEM, CANCELLED.
+ */
 BATTEN_API batten_status batten_mesh_decimate(batten_context *ctx, const batten_mesh *mesh, size_t triangles,
                                               batten_mesh **out, double *distance_max);
 
