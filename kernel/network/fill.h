@@ -21,6 +21,8 @@ void net_half_ribbon(const net_topology *t, const net_node *nodes, const net_loc
 typedef struct net_across {
   double k[4]; /* Bernstein form, cubic */
   double h[2]; /* linear */
+  double miss; /* by which the row beside the edge misses the corners' twists: rounding, unless the curves at a corner
+                  have other curvatures than its form */
 } net_across;
 
 /* Patch of degree 7: the 33 control points that nodes and ribbons determine; the other three, b_322, b_232 and b_223

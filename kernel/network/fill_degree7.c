@@ -19,6 +19,19 @@
 const signed char net_degree7_weights[36] = {-10, 8,  -12, -4, -4, 0, -6, 0, 8,  39, -6, 17, 30, 3, 0, -12, -6, 0,
                                              0,   -6, 0,   -4, 17, 0, -3, 0, -4, 30, -6, 0,  0,  3, 0, -6,  0,  0};
 
+/* Of the edge's length: the normals of the two sides of an edge would differ by a few times this, radians. Rounding
+ * gives some 1e-15, more at very sharp corners; curves that do not have the curvature of the corner's form, far more.
+ */
+static const double MISS_MOST = 1e-12;
+
+/* Weights over 409024 with which the points count for b_322 in the least integral of the fourth derivatives' squares
+ * over an equilateral triangle. That completes every cubic exactly, where second derivatives' squares do so for
+ * planes alone: K strays less. */
+static const int fourth_weights[36] = {1636,  -4998,  -25020, -5217, -51494, -6771, -3304,  1174,  -4998,
+                                       66028, 19847,  188876, 98233, -11434, -994,  -25020, 19847, 0,
+                                       0,     -70936, 3239,   -5217, 188876, 0,     59824,  9567,  -51494,
+                                       98233, -70936, 9567,   -6771, -11434, 3239,  -3304,  -994,  1174};
+
 /* An edge at one of its corners, in the corner's tangent plane: t away from the corner, d into the facet. */
 typedef struct side {
   double t[2], s[2], d[2];
@@ -77,18 +90,20 @@ static unsigned place(unsigned k, unsigned m, unsigned row) {
   return c * 8 - c * (c - 1) / 2 + j;
 }
 
-/* Points 2, 3, 4 of the row beside the edge. */
-static void row_fill(unsigned k, const net_ribbon *ribbon, const net_across *across, double (*out)[3]) {
+/* Points 2, 3, 4 of the row beside the edge. Points 1 and 5 are there from the twists; how far off they are from what
+ * the row asks for. */
+static double row_fill(unsigned k, const net_ribbon *ribbon, const net_across *across, double (*out)[3]) {
   double curve[7][3], rate[5][3], slide[6][3], slides[7][3], turn[7][3];
   bezier_elevate(5, 3, ribbon->c[0], curve[0]);
   bezier_difference(5, 3, ribbon->c[0], rate[0]);
   bezier_multiply(1, across->h, 4, 3, rate[0], slide[0]);
   bezier_elevate(5, 3, slide[0], slides[0]);
   bezier_multiply(3, across->k, 3, 3, ribbon->d[0], turn[0]);
-  for (unsigned m = 2; m < 5; m++) {
-    double *to = out[place(k, m, 1)];
-    for (int x = 0; x < 3; x++) to[x] = curve[m][x] + (turn[m][x] + 5 * slides[m][x]) / 7;
-  }
+  for (unsigned m = 1; m < 6; m++)
+    for (int x = 0; x < 3; x++) curve[m][x] += (turn[m][x] + 5 * slides[m][x]) / 7;
+  for (unsigned m = 2; m < 5; m++)
+    for (int x = 0; x < 3; x++) out[place(k, m, 1)][x] = curve[m][x];
+  return fmax(vec_distance(curve[1], out[place(k, 1, 1)]), vec_distance(curve[5], out[place(k, 5, 1)]));
 }
 
 void net_degree7_frame(const net_node *nodes, const net_ribbon *ribbons, double (*out)[3], net_across *across) {
@@ -125,23 +140,30 @@ void net_degree7_frame(const net_node *nodes, const net_ribbon *ribbons, double 
     bezier_elevate(6, 3, six[0], seven[0]);
     for (unsigned m = 0; m < 7; m++)
       for (int x = 0; x < 3; x++) out[place(k, m, 0)][x] = seven[m][x];
-    row_fill(k, &ribbons[k], &across[k], out);
+    across[k].miss = row_fill(k, &ribbons[k], &across[k], out);
   }
 }
 
-void net_degree7_interior(double (*net)[3]) {
+/* The three interior points from weights of all points for b_322, times total. */
+static inline void interior_make(const int *weights, double total, double (*net)[3]) {
   double sum[3][3] = {{0}};
   for (unsigned c = 0, n = 0; c <= 7; c++)
     for (unsigned b = 0; b + c <= 7; b++, n++) {
-      double weight = net_degree7_weights[n];
-      if (weight == 0) continue;
+      double weight = weights[n];
       unsigned a = 7 - b - c;
       const double *from[3] = {net[n], net[b * 8 - b * (b - 1) / 2 + a], net[a * 8 - a * (a - 1) / 2 + c]};
+      if (weight == 0) continue; /* the interior points themselves may be anything */
       for (int i = 0; i < 3; i++)
         for (int x = 0; x < 3; x++) sum[i][x] += weight * from[i][x];
     }
   for (int i = 0; i < 3; i++)
-    for (int x = 0; x < 3; x++) net[NET_DEGREE7_INTERIOR[i]][x] = sum[i][x] / 66;
+    for (int x = 0; x < 3; x++) net[NET_DEGREE7_INTERIOR[i]][x] = sum[i][x] / total;
+}
+
+void net_degree7_interior(double (*net)[3]) {
+  int weights[36];
+  for (int n = 0; n < 36; n++) weights[n] = net_degree7_weights[n];
+  interior_make(weights, 66, net);
 }
 
 /* True when all coefficients [count][3] have a part of more than `least` of the largest one's length along their
@@ -188,8 +210,11 @@ bool net_across_regular(unsigned n, const double *k, const net_ribbon *ribbon) {
 bool net_fill_degree7(const net_node *nodes, const net_ribbon *ribbons, double (*out)[3]) {
   net_across across[3];
   net_degree7_frame(nodes, ribbons, out, across);
-  net_degree7_interior(out);
-  bool regular = true;
-  for (unsigned k = 0; k < 3; k++) regular = regular && net_across_regular(3, across[k].k, &ribbons[k]);
-  return regular;
+  interior_make(fourth_weights, 409024, out);
+  bool good = true;
+  for (unsigned k = 0; k < 3; k++) {
+    double length = vec_distance(ribbons[k].c[0], ribbons[k].c[5]);
+    good = good && across[k].miss <= MISS_MOST * length && net_across_regular(3, across[k].k, &ribbons[k]);
+  }
+  return good;
 }

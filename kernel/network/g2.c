@@ -18,7 +18,7 @@
 #include "network/fill.h"
 #include "sparse/block.h"
 
-enum { ITEMS_PER_TASK = 256, CG_MOST = 2000 };
+enum { ITEMS_PER_TASK = 256, CG_MOST = 500, DIRECT_MOST = 2000 };
 
 static const double SAFETY = 1e-12, TOLERANCE = 1e-13;
 
@@ -311,24 +311,36 @@ static batten_status make_matrix(batten_context *ctx, g2_job *job) {
   return st;
 }
 
-/* Cholesky; then conjugate gradients, which have nothing left to do, tell the residual. */
+/* *y = A^-1 rhs by Cholesky. */
+static batten_status solve_direct(batten_context *ctx, g2_job *job) {
+  block_plan *plan = NULL;
+  batten_status st = block_plan_new(ctx, &job->a, BLOCK_AUTO, &plan);
+  if (st >= 0) st = block_factor(ctx, plan, &job->a, NULL);
+  if (st >= 0) {
+    memcpy(job->y, job->rhs, 5 * job->t->nodes * sizeof *job->y);
+    block_solve(ctx, plan, job->y);
+  }
+  block_plan_free(ctx, plan);
+  return st;
+}
+
+/* Conjugate gradients also tell the residual of the direct solution, and have nothing else left to do. AUTO takes
+ * them first in large systems: a few dozen iterations are enough unless some node has hardly more than the safety
+ * term to hold it. */
 static batten_status solve(batten_context *ctx, g2_job *job, net_figures *figures) {
   block_cg_figures cg = {0};
-  batten_status st = BATTEN_OK;
-  memset(job->y, 0, 5 * job->t->nodes * sizeof *job->y);
-  if (job->opt->solver != BATTEN_NETWORK_CG) {
-    block_plan *plan = NULL;
-    st = block_plan_new(ctx, &job->a, BLOCK_AUTO, &plan);
-    if (st >= 0) st = block_factor(ctx, plan, &job->a, NULL);
-    if (st >= 0) {
-      memcpy(job->y, job->rhs, 5 * job->t->nodes * sizeof *job->y);
-      block_solve(ctx, plan, job->y);
-    }
-    block_plan_free(ctx, plan);
-    if (st < 0) return st;
-  }
+  batten_network_solver solver = job->opt->solver;
+  bool direct = solver == BATTEN_NETWORK_DIRECT || (solver == BATTEN_NETWORK_AUTO && job->t->nodes < DIRECT_MOST);
+  batten_status st = direct ? solve_direct(ctx, job) : BATTEN_OK;
+  if (st < 0) return st;
   st = block_cg(ctx, &job->a, job->rhs, TOLERANCE, CG_MOST, "network", job->y, &cg);
   figures->cg_iterations += cg.iterations;
+  if (st == BATTEN_W_ACCURACY && solver == BATTEN_NETWORK_AUTO && !direct) {
+    st = solve_direct(ctx, job);
+    if (st < 0) return st;
+    st = block_cg(ctx, &job->a, job->rhs, TOLERANCE, CG_MOST, "network", job->y, &cg);
+    figures->cg_iterations += cg.iterations;
+  }
   figures->residual = cg.residual;
   return st;
 }
