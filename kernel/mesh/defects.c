@@ -103,17 +103,22 @@ done:
 
 /* ---- triangles ---------------------------------------------------------------------------------- */
 
-int batten_mesh_is_degenerate(const double *a, const double *b, const double *c, double size) {
-  if (!(size > 0)) return 1;
-  double unit = batten_unit(size), sides[3][3], n[3], longest = 0; /* lengths below in units near `size` */
+mesh_rounding batten_mesh_rounding(size_t vertex_count, const double *vertices) {
+  double size = batten_mesh_size(vertex_count, vertices), unit = size > 0 ? batten_unit(size) : 1;
+  return (mesh_rounding){unit, 4 * DBL_EPSILON * unit * size};
+}
+
+int batten_mesh_is_degenerate(mesh_rounding rounding, const double *a, const double *b, const double *c) {
+  double unit = rounding.unit, sides[3][3], n[3], longest = 0;
   for (int k = 0; k < 3; k++) {
-    sides[0][k] = unit * b[k] - unit * a[k];
-    sides[1][k] = unit * c[k] - unit * b[k];
-    sides[2][k] = unit * a[k] - unit * c[k];
+    double x = unit * a[k], y = unit * b[k], z = unit * c[k];
+    sides[0][k] = y - x;
+    sides[1][k] = z - y;
+    sides[2][k] = x - z;
   }
   for (int k = 0; k < 3; k++) longest = fmax(longest, vec_dot(sides[k], sides[k]));
   vec_cross(sides[0], sides[1], n);
-  return !(vec_norm(n) > 4 * DBL_EPSILON * unit * size * sqrt(longest));
+  return !(vec_dot(n, n) > rounding.height * rounding.height * longest);
 }
 
 static uint32_t low_corner(const uint32_t *triangles, uint32_t t) {
@@ -163,14 +168,14 @@ batten_status batten_mesh_mark_triangles(batten_context *ctx, size_t vertex_coun
   uint32_t *start = batten_alloc_array(ctx, vertex_count + 1, sizeof *start);
   uint32_t *scratch = start ? batten_alloc_array(ctx, triangle_count, 2 * sizeof *scratch) : NULL;
   if (scratch) {
-    double size = batten_mesh_size(vertex_count, vertices);
+    mesh_rounding rounding = batten_mesh_rounding(vertex_count, vertices);
     for (size_t t = 0; t < triangle_count; t++) {
       const uint32_t *v = triangles + 3 * t;
       const double *a = vertices + 3 * (size_t)v[0], *b = vertices + 3 * (size_t)v[1];
       marks[t] = MESH_GOOD;
       if (v[0] == v[1] || v[1] == v[2] || v[2] == v[0])
         marks[t] = MESH_REPEATED;
-      else if (batten_mesh_is_degenerate(a, b, vertices + 3 * (size_t)v[2], size))
+      else if (batten_mesh_is_degenerate(rounding, a, b, vertices + 3 * (size_t)v[2]))
         marks[t] = MESH_STRAIGHT;
       first[t] = (uint32_t)t;
     }

@@ -42,10 +42,16 @@ batten_status batten_mesh_sort_edges(batten_context *ctx, size_t vertex_count, s
 batten_status batten_mesh_find_welds(batten_context *ctx, size_t vertex_count, const double *vertices,
                                      const unsigned char *used, double radius, uint32_t *kept);
 
-/* The largest |coordinate|, and whether the corners a b c lie on one line to the rounding of coordinates of that
- * size: the triangle's height over its longest side is below 4 units in the last place of `size`. */
+/* The largest |coordinate|. */
 double batten_mesh_size(size_t vertex_count, const double *vertices);
-int batten_mesh_is_degenerate(const double *a, const double *b, const double *c, double size);
+
+/* Whether the corners a b c lie on one line to the rounding of coordinates of the mesh's size: the triangle's height
+ * over its longest side is below 4 units in the last place of the largest coordinate. */
+typedef struct mesh_rounding {
+  double unit, height; /* a power of two that brings coordinates to about 1; the bound in these units */
+} mesh_rounding;
+mesh_rounding batten_mesh_rounding(size_t vertex_count, const double *vertices);
+int batten_mesh_is_degenerate(mesh_rounding rounding, const double *a, const double *b, const double *c);
 
 /* marks [F]: MESH_GOOD, or the first reason that holds why a triangle is none. Of the same three corners, whichever
  * way round, the first triangle is good; first [F] tells the others which one that is. */

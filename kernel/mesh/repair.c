@@ -171,7 +171,7 @@ static batten_status swap_round(batten_context *ctx, repair *r, size_t *swapped)
   batten_status st = pair_edges(ctx, r, &crowded);
   if (st < 0) return st;
   size_t half_edges = 3 * r->triangles;
-  double unit = batten_unit(batten_mesh_size(r->mesh->vertex_count, r->mesh->vertices));
+  double unit = batten_mesh_rounding(r->mesh->vertex_count, r->mesh->vertices).unit;
   uint32_t *low = batten_alloc_array(ctx, half_edges, 2 * sizeof *low);
   if (!low) return BATTEN_E_NOMEM;
   uint32_t *high = low + half_edges;
@@ -324,8 +324,7 @@ static void settle_part(repair *r, size_t count, int closed, double unit) {
 }
 
 static batten_status orient(batten_context *ctx, repair *r) {
-  double size = batten_mesh_size(r->mesh->vertex_count, r->mesh->vertices);
-  double unit = size > 0 ? batten_unit(size) : 1;
+  double unit = batten_mesh_rounding(r->mesh->vertex_count, r->mesh->vertices).unit;
   memset(r->marks, UNSEEN, r->triangles);
   for (uint32_t t = 0; t < r->triangles; t++) {
     size_t count = 0;

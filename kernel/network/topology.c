@@ -19,7 +19,7 @@ typedef struct scratch {
 
 /* False when a triangle has no area, or a vertex no triangle. */
 static bool sort_corners(const net_topology *t, scratch *s) {
-  double size = batten_mesh_size(t->vertices, t->points);
+  mesh_rounding rounding = batten_mesh_rounding(t->vertices, t->points);
   bool good = true;
   memset(s->start, 0, (t->vertices + 1) * sizeof *s->start);
   for (size_t f = 0; f < t->faces; f++) {
@@ -29,7 +29,7 @@ static bool sort_corners(const net_topology *t, scratch *s) {
       s->start[v[k] + 1]++;
       p[k] = t->points + 3 * (size_t)v[k];
     }
-    good &= v[0] != v[1] && v[1] != v[2] && v[2] != v[0] && !batten_mesh_is_degenerate(p[0], p[1], p[2], size);
+    good &= v[0] != v[1] && v[1] != v[2] && v[2] != v[0] && !batten_mesh_is_degenerate(rounding, p[0], p[1], p[2]);
   }
   for (size_t v = 0; v < t->vertices; v++) {
     good &= s->start[v + 1] > 0;

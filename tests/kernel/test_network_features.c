@@ -115,6 +115,22 @@ static void check(const char *what, const net_topology *t) {
   T_RATIO(off, 1e-14, "%s: nodes know the creases at their sides", what);
 }
 
+/* Normals that keep to the constraints hold every crease in the planes on both of its sides, so that both have the
+ * same curve. */
+static void check_planes(const char *what, const net_topology *t, const batten_network_options *opt) {
+  double *normals = scene_allocate(3 * t->nodes * sizeof *normals), off = 0;
+  if (net_normals_make(ctx, t, opt, normals) != BATTEN_OK) off = INFINITY;
+  for (uint32_t e = 0; e < t->edges; e++)
+    for (unsigned end = 0; end < 2; end++)
+      for (unsigned side = 0; side < 2 && t->kind[e] == NET_CREASE; side++) {
+        uint32_t node = net_edge_node(t, e, end, side);
+        if (node == NET_NONE || t->constraint[node].kind == NET_FREE) continue;
+        off = fmax(off, fabs(dot(normals + 3 * node, t->guide + 6 * e + 3 * end)));
+      }
+  T_RATIO(off, 1e-13, "%s: creases lie in the planes on both sides", what);
+  free(normals);
+}
+
 /* ---- by hand ------------------------------------------------------------------------------------ */
 
 static scene_mesh cube(void) {
@@ -404,6 +420,7 @@ static void test_random(void) {
     char what[80];
     snprintf(what, sizeof what, "round %d, %zu creases", round, opt.crease_count);
     check(what, &t);
+    check_planes(what, &t, &opt);
 
     /* In another unit: the same bits. */
     double *points = m.points;
