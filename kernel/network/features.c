@@ -413,7 +413,7 @@ static batten_status make_creases(batten_context *ctx, features *f, const unsign
     if (!is_crease[e]) continue;
     any = true;
     t->kind[e] = NET_CREASE;
-    t->crease_edges += !is_boundary_edge(t, e);
+    t->crease_edges++;
   }
   if (!any) return BATTEN_OK;
   t->bend = batten_alloc_array(ctx, t->edges, 6 * sizeof *t->bend);

@@ -69,8 +69,8 @@ typedef struct net_topology {
                            outgoing, before projection into the tangent plane; 0 0 0 = free */
   double *bend;         /* [edges][2][3] or NULL: curvature vectors of curves that are fixed (crease edges at ends
                            that are not free), orthogonal to guide */
-  net_constraint *constraint; /* [nodes] or NULL: all free */
-  size_t boundary_edges, crease_edges, line_edges;
+  net_constraint *constraint;                      /* [nodes] or NULL: all free */
+  size_t boundary_edges, crease_edges, line_edges; /* crease_edges: all of kind NET_CREASE */
 } net_topology;
 
 /* points and triangles as in a mesh; stay the caller's. Checks: INVALID with vertex, edge and triangle numbers. No

@@ -294,7 +294,7 @@ static void test_darts(void) {
   opt.creases = edge;
   opt.crease_count = 1;
   t = make(&m, &opt);
-  T_CHECK(t.nodes == 25 && t.crease_edges == 0 && kind_at(&t, 1, &count) == NET_FREE, "a boundary edge as crease");
+  T_CHECK(t.nodes == 25 && t.crease_edges == 1 && kind_at(&t, 1, &count) == NET_FREE, "a boundary edge as crease");
   check("boundary edge as crease", &t);
   net_topology_free(ctx, &t);
   scene_mesh_free(&m);
@@ -310,7 +310,7 @@ static void test_boundary_curves(void) {
     corners += t.constraint[i].kind == NET_CORNER;
     creased += t.constraint[i].kind == NET_CREASED;
   }
-  T_CHECK(t.nodes == 25 && corners == 4 && creased == 12 && t.crease_edges == 0 && t.boundary_edges == 16,
+  T_CHECK(t.nodes == 25 && corners == 4 && creased == 12 && t.crease_edges == 16 && t.boundary_edges == 16,
           "boundary curves of a square: 4 corners, 12 creased");
   check("boundary curves", &t);
   net_topology_free(ctx, &t);
