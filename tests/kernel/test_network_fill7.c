@@ -164,6 +164,46 @@ static void refusals(void) {
   T_CHECK(!net_across_regular(3, good, &ribbon), "the field turns to the other side of the curve");
 }
 
+/* Curves that leave with speeds of all sizes: k turns negative in facets, and those alone take degree 6. */
+static void falls_back(void) {
+  for (int i = 0; i < 3; i++) {
+    const char *name = i == 0 ? "shifted octahedron" : i == 1 ? "torus" : "graph";
+    network_rig r;
+    uint64_t seed = 5;
+    rig_open(ctx,
+             i == 0   ? scene_mesh_octahedron_shifted(1, .6)
+             : i == 1 ? scene_mesh_torus_10_6()
+                      : scene_mesh_graph_7(),
+             NULL, NULL, &r);
+    rig_nodes_random(&r, 0.3, 3);
+    for (size_t e = 0; e < 2 * r.topology.edges; e++) {
+      double factor = pow(i == 0 ? 6 : 2.2, 2 * t_uniform(&seed) - 1);
+      for (int x = 0; x < 3; x++) r.local[e / 2].t[e % 2][x] *= factor;
+    }
+    joint_figures seven = rig_fill(&r, RIG_7, 21), back = rig_fill(&r, RIG_FALLBACK, 21);
+    T_CHECK(r.refused > 0 && 2 * r.refused <= r.topology.faces,
+            "%s: %zu of %zu refused, alone they are off by %.3g degrees", name, r.refused, r.topology.faces,
+            seven.angle_deg);
+    T_RATIO(back.angle_deg, 1e-9, "%s: normals at joints with degree 6 there, degrees", name);
+    rig_close(&r);
+  }
+}
+
+/* A crease's curve may have another curvature than a corner's form: then no twist fits both edges. */
+static void misses(void) {
+  network_rig r;
+  rig_open(ctx, scene_mesh_octahedron_shifted(.5, .3), NULL, NULL, &r);
+  rig_nodes_random(&r, 0.3, 4);
+  net_node node[3];
+  net_ribbon ribbon[3];
+  double net[36][3];
+  net_facet_ribbons(&r.topology, r.nodes, r.local, 0, node, ribbon);
+  T_CHECK(net_fill_degree7(node, ribbon, net), "curvatures of the forms");
+  for (int x = 0; x < 3; x++) ribbon[0].c[2][x] += 1e-6 * node[0].w[x];
+  T_CHECK(!net_fill_degree7(node, ribbon, net), "one of another curvature");
+  rig_close(&r);
+}
+
 int main(void) {
   ctx = t_context(NULL, NULL, 1);
   joints();
@@ -171,6 +211,8 @@ int main(void) {
   corners_turn();
   plane();
   refusals();
+  falls_back();
+  misses();
   batten_context_free(ctx);
   return t_done();
 }
