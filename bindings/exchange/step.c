@@ -150,8 +150,12 @@ static void put_triangle(step_file *s, const batten_network_patch *patch, const 
 static void put_quads(step_file *s, const batten_network_patch *patch, const side sides[3], uint64_t *faces) {
   unsigned n = patch->degree, width = n + 1;
   uint64_t centre = put_vertex(s, s->squares[0][width * width - 1]), spokes[3];
-  for (unsigned k = 0; k < 3; k++)
-    spokes[k] = put_curve(s, n, (const double(*)[3])s->squares[k] + n * width, sides[k].wire.middle, centre);
+  for (unsigned k = 0; k < 3; k++) {
+    double points[BX_DEGREE_MAX + 1][3];
+    memcpy(points, s->squares[k] + n * width, width * sizeof points[0]);
+    unsigned degree = bx_curve_reduce(n, points, bx_brep_rounding(s->brep));
+    spokes[k] = put_curve(s, degree, (const double(*)[3])points, sides[k].wire.middle, centre);
+  }
   for (unsigned k = 0; k < 3; k++) {
     const side *next = &sides[k], *last = &sides[(k + 2) % 3];
     uint64_t surface = put_surface(s, n, (const double(*)[3])s->squares[k]);

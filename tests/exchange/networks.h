@@ -1,4 +1,5 @@
-/* Networks whose surface is known exactly: polyhedra, pieces of z = quadratic, both in any degree, whole or in parts. */
+/* Networks whose surface is known exactly: polyhedra, pieces of z = quadratic, both in any degree, whole or in parts.
+ */
 #ifndef TEST_NETWORKS_H
 #define TEST_NETWORKS_H
 
@@ -74,8 +75,7 @@ static inline batten_status network_of(batten_context *ctx, network_map *map, si
           .degree = degree, .face = (uint32_t)f, .part = parts == 3 ? p + 1 : 0, .control_points = net};
     }
   }
-  batten_status st =
-      batten_network_create(ctx, vertex_count, mapped, faces, triangles, count, patches, 0, NULL, out);
+  batten_status st = batten_network_create(ctx, vertex_count, mapped, faces, triangles, count, patches, 0, NULL, out);
   free(mapped);
   free(points);
   free(patches);

@@ -20,6 +20,8 @@ static const struct {
     {"c.json", "\xef\xbb\xbf{\"batten\": \"curve\"}", BATTEN_FILE_DOCUMENT},
     {"qp.json", "{\"batten\": \"qp\", \"version\": 1}", BATTEN_FILE_QP},
     {"s.json", "{\"batten\": \"qp_solution\", \"version\": 1}", BATTEN_FILE_DOCUMENT},
+    {"n.json", "{\"batten\": \"network\", \"version\": 1}", BATTEN_FILE_NETWORK},
+    {"a.step", "ISO-10303-21;", BATTEN_FILE_UNKNOWN},
     {"a.QPS", "NAME\n", BATTEN_FILE_QP},
     {"a.sif", "", BATTEN_FILE_QP},
     {"a.mat", "MATLAB", BATTEN_FILE_QP},

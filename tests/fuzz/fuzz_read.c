@@ -88,6 +88,28 @@ static const char *load_carrier(bx_reader *r) {
   return st < 0 ? "a carrier that cannot be evaluated" : NULL;
 }
 
+static const char *read_network(bx_reader *r) {
+  batten_network *network = NULL;
+  batten_status st = bx_read_network_from(r, &network);
+  if (st != BATTEN_OK) return network ? "a result in spite of a failure" : check_failure(r->ctx, st);
+  const char *wrong = NULL;
+  size_t vertices = batten_network_vertex_count(network), faces = batten_network_face_count(network);
+  for (size_t i = 0; i < 3 * faces; i++)
+    if (batten_network_triangles(network)[i] >= vertices) wrong = "a corner that is no vertex";
+  for (size_t p = 0; p < batten_network_patch_count(network); p++) {
+    batten_network_patch patch = batten_network_get_patch(network, p);
+    if (patch.degree < 1 || patch.degree > 12 || patch.face >= faces || patch.part > 3) {
+      wrong = "a patch of nothing";
+      break;
+    }
+    size_t numbers = 3 * (size_t)(patch.degree + 1) * (patch.degree + 2) / 2;
+    for (size_t i = 0; i < numbers; i++)
+      if (!isfinite(patch.control_points[i])) wrong = "a control point that is not finite";
+  }
+  batten_network_free(network);
+  return wrong;
+}
+
 static const char *check_matrix(const batten_matrix *m, size_t n) {
   if (!m) return NULL;
   if (m->columns != n) return "a matrix of another width";
@@ -134,11 +156,12 @@ static bool read_once(bx_reader *r, bx_format format, unsigned which, const char
     return true;
   }
   if (format == BX_JSON) {
-    if (which > 3) return false;
+    if (which > 4) return false;
     *wrong = which == 0   ? load_solid(r)
              : which == 1 ? load_carrier(r)
              : which == 2 ? read_qp(r, format)
-                          : load_qp_solution(r);
+             : which == 3 ? load_qp_solution(r)
+                          : read_network(r);
     return true;
   }
   if (which == 3 && format != BX_TEXT)
