@@ -35,12 +35,12 @@ typedef struct collapse {
 
 typedef struct decimation {
   size_t vertex_count, triangle_count;
-  uint32_t *triangles; /* [F][3]; MESH_NONE: gone */
-  uint32_t *twin;      /* [3 F] MESH_NONE at boundaries */
-  uint32_t *out;       /* [V] an outgoing half-edge, at boundaries the first of the fan; MESH_NONE: not in use */
-  double *points;      /* [V][3] about the centre, size about 1 */
-  uint32_t *source;    /* [V] vertex whose place it has; MESH_NONE: a new one */
-  quadric *quadrics;   /* [V] */
+  uint32_t *triangles;   /* [F][3]; MESH_NONE: gone */
+  uint32_t *twin;        /* [3 F] MESH_NONE at boundaries */
+  uint32_t *out;         /* [V] an outgoing half-edge, at boundaries the first of the fan; MESH_NONE: not in use */
+  double *points;        /* [V][3] about the centre, size about 1 */
+  uint32_t *source;      /* [V] vertex whose place it has; MESH_NONE: a new one */
+  quadric *quadrics;     /* [V] */
   uint32_t *mark, stamp; /* [V] */
   heap heap;
 } decimation;
@@ -493,8 +493,9 @@ batten_status batten_mesh_decimate(batten_context *ctx, const batten_mesh *mesh,
   if (made < 0) goto done;
   if (distance_max) *distance_max = sqrt(error) / unit;
   if (left > triangles)
-    st = batten_fail(ctx, BATTEN_W_ACCURACY, "triangles: %zu are left of %zu, %zu were wanted; no further edge may go",
-                     left, mesh->triangle_count, triangles);
+    st =
+        batten_fail(ctx, BATTEN_W_ACCURACY, "triangles: %zu are left of %zu, %zu were wanted; no further edge may go",
+                    left, mesh->triangle_count, triangles);
 done:
   give_back(ctx, &d);
   batten_free(ctx, order);

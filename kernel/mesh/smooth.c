@@ -17,9 +17,9 @@
 /* Rows of L: neighbours of i; the same by columns: vertices that have i as a neighbour. */
 typedef struct umbrella {
   size_t count;
-  size_t *starts, *back_starts;  /* [count + 1] */
+  size_t *starts, *back_starts; /* [count + 1] */
   uint32_t *columns, *back;
-  double *weight;                /* [count] 1 / neighbours; 0 without */
+  double *weight; /* [count] 1 / neighbours; 0 without */
 } umbrella;
 
 static void umbrella_free(batten_context *ctx, umbrella *l) {
@@ -79,8 +79,7 @@ static batten_status umbrella_make(batten_context *ctx, const batten_mesh *mesh,
   if (st < 0) goto done;
   memset(on_boundary, 0, n);
   for (size_t at = 0; at < half_edges;)
-    if (next_edge(half_edges, mesh->triangles, order, &at, &e) && e.boundary)
-      on_boundary[e.a] = on_boundary[e.b] = 1;
+    if (next_edge(half_edges, mesh->triangles, order, &at, &e) && e.boundary) on_boundary[e.a] = on_boundary[e.b] = 1;
   memset(l.starts, 0, (n + 1) * sizeof *l.starts);
   memset(l.back_starts, 0, (n + 1) * sizeof *l.back_starts);
   for (size_t at = 0; at < half_edges;)
@@ -116,11 +115,11 @@ enum { PART = 4096 }; /* vertices of a task: some 100 us */
 typedef struct descent {
   umbrella l;
   double lambda;
-  const double *from;         /* of umbrella_part: what L is applied to */
-  double *d, *r, *p, *y, *t;  /* [count][3]: move, residual, direction, product or preconditioned residual, L p */
-  double *diagonal;           /* [count] of L'L */
-  double *bend;               /* [count][3] L'L x0 */
-  double (*share)[3];         /* [parts] sums of the pass */
+  const double *from;        /* of umbrella_part: what L is applied to */
+  double *d, *r, *p, *y, *t; /* [count][3]: move, residual, direction, product or preconditioned residual, L p */
+  double *diagonal;          /* [count] of L'L */
+  double *bend;              /* [count][3] L'L x0 */
+  double (*share)[3];        /* [parts] sums of the pass */
   double step[3], mix[3];
 } descent;
 
@@ -305,7 +304,8 @@ static batten_status search(batten_context *ctx, descent *s, double in_use, doub
     if (g > 0) {
       if (s->lambda >= LAMBDA_MOST)
         return batten_fail(ctx, BATTEN_W_ACCURACY,
-                           "noise: too large; all but flat, the mesh has moved by %.6g of it; give less", 1 / (1 + g));
+                           "noise: too large; all but flat, the mesh has moved by %.6g of it; give less",
+                           1 / (1 + g));
       if (side > 0) g_low /= 2; /* Illinois */
       high = mu, g_high = g, side = 1;
     } else {
@@ -359,8 +359,8 @@ static batten_status find_move(batten_context *ctx, descent *s, const double *po
 static batten_status copy_mesh(batten_context *ctx, const batten_mesh *mesh, const double *vertices,
                                batten_mesh **out) {
   batten_mesh *copy;
-  batten_status st = batten_mesh_create(ctx, mesh->vertex_count, vertices, mesh->triangle_count, mesh->triangles,
-                                        &copy);
+  batten_status st =
+      batten_mesh_create(ctx, mesh->vertex_count, vertices, mesh->triangle_count, mesh->triangles, &copy);
   if (st < 0) return st;
   for (size_t i = 0; i < mesh->field_count && st == BATTEN_OK; i++)
     st = batten_mesh_set_field(ctx, copy, mesh->fields[i].name, mesh->fields[i].components, mesh->fields[i].values);

@@ -297,8 +297,16 @@ batten_status block_fronts_new(batten_context *ctx, const qp_graph *g, unsigned 
   batten_status st = BATTEN_E_NOMEM;
   uint32_t *arrays = batten_alloc_array(ctx, n, ANALYSIS_ARRAYS * sizeof *arrays);
   if (!arrays || !take_fronts(ctx, n, &f)) goto done;
-  analysis w = {g, arrays, arrays + n, arrays + 2 * n, arrays + 3 * n, arrays + 4 * n, arrays + 5 * n, arrays + 6 * n,
-                arrays + 7 * n, arrays + 8 * n};
+  analysis w = {g,
+                arrays,
+                arrays + n,
+                arrays + 2 * n,
+                arrays + 3 * n,
+                arrays + 4 * n,
+                arrays + 5 * n,
+                arrays + 6 * n,
+                arrays + 7 * n,
+                arrays + 8 * n};
   memcpy(w.order, order, n * sizeof *order);
   invert(&w);
   find_parents(&w);
@@ -312,9 +320,9 @@ batten_status block_fronts_new(batten_context *ctx, const qp_graph *g, unsigned 
   f.relative = batten_alloc_array(ctx, f.row_starts[f.count], sizeof *f.relative);
   if (!f.relative) goto done;
   fill_rows(&w, &f);
-  st = measure(&f) ? BATTEN_OK
-                   : batten_fail(ctx, BATTEN_E_TOO_LARGE, "sparse system: %zu rows fill in beyond the address space",
-                                 n);
+  st = measure(&f)
+           ? BATTEN_OK
+           : batten_fail(ctx, BATTEN_E_TOO_LARGE, "sparse system: %zu rows fill in beyond the address space", n);
 done:
   batten_free(ctx, arrays);
   if (st < 0)

@@ -128,9 +128,9 @@ size_t block_work_bytes(const block_fronts *f, const block_work *w) {
 enum { TILE = 160 }; /* columns and rows of a tile: 20 rows of a tile fit the first cache, a tile the second */
 
 typedef struct dense_front {
-  double *panel, *update;   /* [height][own], [below][below], columns of length height, below */
+  double *panel, *update; /* [height][own], [below][below], columns of length height, below */
   size_t height, own, below;
-  size_t from, to;          /* the columns of the step */
+  size_t from, to; /* the columns of the step */
 } dense_front;
 
 static size_t tiles(size_t length) { return (length + TILE - 1) / TILE; }
@@ -175,13 +175,13 @@ static void run_tiles(batten_context *ctx, size_t count, void (*tile)(void *arg,
   for (size_t i = 0; i < count; i++) tile(d, i);
 }
 
-/* Factor of the panel and the update that it leaves. 0, or the 1-based row of the pivot that is not positive. ctx NULL:
- * on this thread. */
+/* Factor of the panel and the update that it leaves. 0, or the 1-based row of the pivot that is not positive. ctx
+ * NULL: on this thread. */
 static size_t factor_dense(batten_context *ctx, dense_front *d) {
   for (d->from = 0; d->from < d->own; d->from = d->to) {
     d->to = least(d->own, d->from + TILE);
-    size_t bad = batten_la_potrf(BATTEN_LA_DOUBLE, 'L', d->to - d->from, d->panel + d->from * (d->height + 1),
-                                 d->height);
+    size_t bad =
+        batten_la_potrf(BATTEN_LA_DOUBLE, 'L', d->to - d->from, d->panel + d->from * (d->height + 1), d->height);
     for (size_t j = d->from; j < d->to && !bad; j++) /* some BLAS let NaN pass */
       if (!isfinite(d->panel[j * (d->height + 1)])) bad = j - d->from + 1;
     if (bad) return d->from + bad;

@@ -13,18 +13,18 @@
 /* Numbers count nodes unless said otherwise. */
 typedef struct block_fronts {
   size_t nodes, count, size;
-  uint32_t *order;     /* [nodes] node at a place */
-  uint32_t *first;     /* [count + 1] first own place */
-  uint32_t *parent;    /* [count] UINT32_MAX: root */
-  uint32_t *subtree;   /* [count] supernodes in the subtree, itself included */
-  size_t *row_starts;  /* [count + 1] */
-  uint32_t *rows;      /* places below the own ones, ascending */
-  uint32_t *relative;  /* of each such place: which row of the parent's front */
-  size_t *panel;       /* [count + 1] doubles before the panel: columns of the front, own ones, one after the other */
-  size_t *entry_starts; /* [count + 1] */
-  size_t *entries;     /* blocks of the matrix that belong to the panel: rows of them are columns there */
-  size_t *targets;     /* doubles of all panels before the block's first */
-  size_t height_most;  /* largest front, in unknowns */
+  uint32_t *order;    /* [nodes] node at a place */
+  uint32_t *first;    /* [count + 1] first own place */
+  uint32_t *parent;   /* [count] UINT32_MAX: root */
+  uint32_t *subtree;  /* [count] supernodes in the subtree, itself included */
+  size_t *row_starts; /* [count + 1] */
+  uint32_t *rows;     /* places below the own ones, ascending */
+  uint32_t *relative; /* of each such place: which row of the parent's front */
+  size_t *panel;      /* [count + 1] doubles before the panel: columns of the front, own ones, one after the other */
+  size_t *entry_starts;  /* [count + 1] */
+  size_t *entries;       /* blocks of the matrix that belong to the panel: rows of them are columns there */
+  size_t *targets;       /* doubles of all panels before the block's first */
+  size_t height_most;    /* largest front, in unknowns */
   double flops, seconds; /* predicted */
 } block_fronts;
 
@@ -43,6 +43,8 @@ double block_front_seconds(double own, double below);
 
 /* Neighbours of all nodes. */
 batten_status block_graph(batten_context *ctx, const block_matrix *a, qp_graph *out);
+/* Order of elimination by nested dissection: order[place] = node. */
+batten_status block_order_dissection(batten_context *ctx, const qp_graph *g, uint32_t *order);
 /* Supernodes of the factor in this order of elimination, [rows], which is changed into an equivalent one. TOO_LARGE:
  * more than size_t or 32 bits can count. */
 batten_status block_fronts_new(batten_context *ctx, const qp_graph *g, unsigned size, const uint32_t *order,

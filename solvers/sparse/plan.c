@@ -10,10 +10,10 @@
 #include "qp/band.h"
 
 typedef struct band {
-  uint32_t *place;   /* [rows] */
-  size_t n, width;   /* unknowns, diagonals beside the main one */
-  double *factor;    /* [n][width + 1], see qp/band.h */
-  double *vector;    /* [n] */
+  uint32_t *place; /* [rows] */
+  size_t n, width; /* unknowns, diagonals beside the main one */
+  double *factor;  /* [n][width + 1], see qp/band.h */
+  double *vector;  /* [n] */
 } band;
 
 struct block_plan {
@@ -80,8 +80,24 @@ static void band_solve(const band *b, size_t rows, size_t size, double *x) {
   for (size_t i = 0; i < rows; i++) memcpy(x + i * size, b->vector + b->place[i] * size, size * sizeof *x);
 }
 
+/* Fronts after dissection, where these are cheaper than those at hand. */
+static batten_status try_dissection(batten_context *ctx, const qp_graph *g, block_plan *plan, uint32_t *order) {
+  block_fronts fronts;
+  batten_status st = block_order_dissection(ctx, g, order);
+  if (st >= 0) st = block_fronts_new(ctx, g, plan->size, order, &fronts);
+  if (st < 0) return st;
+  if (fronts.seconds < plan->fronts.seconds) {
+    block_fronts swap = plan->fronts;
+    plan->fronts = fronts;
+    fronts = swap;
+  }
+  block_fronts_free(ctx, &fronts);
+  return BATTEN_OK;
+}
+
 /* Decides by predicted time; what is left of the fronts is that of the choice. */
 static batten_status choose(batten_context *ctx, const block_matrix *a, block_plan *plan) {
+  enum { DISSECTED = 500 }; /* rows: from here on dissection can win */
   batten_status st = BATTEN_E_NOMEM;
   qp_graph g = {0};
   size_t apart = 0, rows = a->rows;
@@ -96,6 +112,7 @@ static batten_status choose(batten_context *ctx, const block_matrix *a, block_pl
     qp_graph_free(ctx, &g);
     if (st >= 0) st = block_graph(ctx, a, &g);
     if (st >= 0) st = block_fronts_new(ctx, &g, plan->size, order, &plan->fronts);
+    if (st >= 0 && rows > DISSECTED) st = try_dissection(ctx, &g, plan, order);
   }
   if (st < 0) goto done;
   size_t n = rows * plan->size, width = band_width(plan->size, apart);

@@ -18,7 +18,8 @@ static bool clean(batten_context *ctx, const batten_mesh *mesh) {
   batten_mesh_defects d;
   if (batten_mesh_find_defects(ctx, mesh, &d) != BATTEN_OK) return false;
   return d.isolated_vertices + d.duplicate_vertices + d.degenerate_triangles + d.duplicate_triangles +
-             d.nonmanifold_edges + d.flipped_edges + d.nonmanifold_vertices == 0;
+             d.nonmanifold_edges + d.flipped_edges + d.nonmanifold_vertices ==
+         0;
 }
 
 /* Decimated, of the same topology and without defects; after may be NULL. */
@@ -115,8 +116,8 @@ static void test_curved(batten_context *ctx) {
 static void test_least(batten_context *ctx) {
   batten_mesh_measures before, after;
   double distance = 0;
-  scene_mesh meshes[] = {scene_mesh_icosphere(6), scene_mesh_torus(12, 8), scene_mesh_genus3(), scene_mesh_ears(5),
-                         scene_mesh_cube_26(), scene_mesh_tetrahedron(), scene_mesh_triangle()};
+  scene_mesh meshes[] = {scene_mesh_icosphere(6), scene_mesh_torus(12, 8),  scene_mesh_genus3(),  scene_mesh_ears(5),
+                         scene_mesh_cube_26(),    scene_mesh_tetrahedron(), scene_mesh_triangle()};
   const char *names[] = {"sphere", "torus", "genus 3", "ears", "cube", "tetrahedron", "triangle"};
   for (size_t i = 0; i < sizeof meshes / sizeof *meshes; i++) {
     batten_mesh *out = decimated(ctx, names[i], &meshes[i], 1, &distance, &before, &after);

@@ -28,8 +28,8 @@ static double move(size_t n, const double *a, const double *b) {
   return sqrt(sum / (3 * (double)n));
 }
 
-/* Each vertex's neighbours cancel, so L x = x and d = -lambda / (1 + lambda) x: noise of half the mean coordinate takes
- * lambda = 1. */
+/* Each vertex's neighbours cancel, so L x = x and d = -lambda / (1 + lambda) x: noise of half the mean coordinate
+ * takes lambda = 1. */
 static void test_hand(batten_context *ctx) {
   scene_mesh m = scene_mesh_octahedron();
   batten_mesh *mesh = mesh_of(ctx, &m), *out = NULL;

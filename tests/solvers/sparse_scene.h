@@ -96,8 +96,7 @@ static inline double *scene_dense(const block_matrix *a) {
   for (size_t i = 0; i < a->rows; i++)
     for (size_t e = a->starts[i]; e < a->starts[i + 1]; e++)
       for (size_t p = 0; p < s; p++)
-        for (size_t q = 0; q < s; q++)
-          full[(a->columns[e] * s + q) * n + i * s + p] = a->values[(e * s + p) * s + q];
+        for (size_t q = 0; q < s; q++) full[(a->columns[e] * s + q) * n + i * s + p] = a->values[(e * s + p) * s + q];
   return full;
 }
 

@@ -50,7 +50,8 @@ static void test_dense(batten_context *ctx) {
     block_matrix a;
     T_OK(scene_matrix(ctx, &g, size, 0.3, &seed, &a), ctx);
     size_t n = a.rows * size;
-    double *full = scene_dense(&a), *x = scene_vector(n, &seed), *y = calloc(n, sizeof *y), *b = scene_vector(n, &seed);
+    double *full = scene_dense(&a), *x = scene_vector(n, &seed), *y = calloc(n, sizeof *y),
+           *b = scene_vector(n, &seed);
     batten_la_gemv(BATTEN_LA_DOUBLE, 'N', n, n, 1, full, n, x, 0, y);
     double *z = malloc(n * sizeof *z);
     block_matrix_apply(ctx, &a, x, z);
