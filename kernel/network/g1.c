@@ -96,11 +96,12 @@ static double beltrami_terms(const double *e, const double (*t)[3], double weigh
 typedef struct g1_job {
   const net_topology *t;
   const batten_network_options *opt;
-  double *normals;   /* [nodes][3] */
-  net_node *nodes;   /* [nodes] */
-  double *forms;     /* [nodes][3] for L3 and L4, else NULL */
-  net_local *local;  /* [edges] */
-  edge_terms *terms; /* [edges] of the Laplace-Beltrami functional, else NULL */
+  batten_network_length length; /* of the pass in hand */
+  double *normals;              /* [nodes][3] */
+  net_node *nodes;              /* [nodes] */
+  double *forms;                /* [nodes][3] for L3 and L4, else NULL */
+  net_local *local;             /* [edges] */
+  edge_terms *terms;            /* [edges] of the Laplace-Beltrami functional, else NULL */
   block_matrix a;
   double *rhs, *x;    /* [nodes][2] */
   double turn_max;    /* radians, of this pass */
@@ -123,26 +124,33 @@ static void edge_chord(const net_topology *t, size_t e, double *chord) {
   vec_sub(t->points + (size_t)3 * t->triangles[net_next(h)], t->points + (size_t)3 * t->triangles[h], chord);
 }
 
+/* Lengths that ask for curvatures. */
+static bool is_curved(batten_network_length length) {
+  return length == BATTEN_LENGTH_L3 || length == BATTEN_LENGTH_L4;
+}
+
 static void make_frames(void *arg, size_t index) {
   g1_job *job = arg;
   const net_topology *t = job->t;
   for (size_t i = index * ITEMS_PER_TASK; i < task_end(index, t->nodes); i++) {
     bool creased = kind_of(t, i) == NET_CREASED;
     net_frame(job->normals + 3 * i, creased ? t->constraint[i].d[0] : NULL, &job->nodes[i]);
-    if (job->forms) net_curvature_estimate(t, (uint32_t)i, &job->nodes[i], job->forms + 3 * i);
+    if (is_curved(job->length)) net_curvature_estimate(t, (uint32_t)i, &job->nodes[i], job->forms + 3 * i);
   }
 }
 
 static void make_tangents(void *arg, size_t index) {
   g1_job *job = arg;
   const net_topology *t = job->t;
-  double energy = 0, power = job->opt->weight_power;
+  batten_network_options opt = *job->opt;
+  opt.length = job->length;
+  double energy = 0, power = opt.weight_power;
   size_t substitutes = 0;
   for (size_t e = index * ITEMS_PER_TASK; e < task_end(index, t->edges); e++) {
     net_local *local = &job->local[e];
     double chord[3];
     edge_chord(t, e, chord);
-    substitutes += net_tangent_edge(t, job->opt, job->nodes, job->forms, (uint32_t)e, local);
+    substitutes += net_tangent_edge(t, &opt, job->nodes, job->forms, (uint32_t)e, local);
     const double(*tangents)[3] = (const double(*)[3])local->t;
     double square = vec_dot(chord, chord);
     /* The cube of the length makes weights mean the same for both functionals. */
@@ -316,26 +324,53 @@ static double pass_tolerance(const batten_network_options *opt, double turn) {
   return fmin(fmax(tolerance, 1e-12), 1e-3);
 }
 
-static batten_status iterate(batten_context *ctx, g1_job *job, block_plan *plan, net_figures *figures) {
-  const batten_network_options *opt = job->opt;
+/* Slopes from the frames and local parameters at hand. */
+static batten_status solve_pass(batten_context *ctx, g1_job *job, block_plan *plan, double turn,
+                                net_figures *figures) {
+  batten_status st =
+      batten_progress(ctx, "normals", (double)figures->normal_passes / (double)job->opt->normal_passes);
+  if (st < 0) return st;
+  batten_parallel(ctx, task_count(job->t->nodes), assemble, job);
+  return plan ? solve_direct(ctx, job, plan, figures) : solve_cg(ctx, job, pass_tolerance(job->opt, turn), figures);
+}
+
+static batten_status iterate(batten_context *ctx, g1_job *job, block_plan *plan, unsigned passes,
+                             net_figures *figures) {
   batten_status worst = BATTEN_OK;
   job->turn_max = TURN_MAX;
   for (unsigned pass = 0;; pass++) {
     prepare_pass(ctx, job, &figures->energy, &figures->clamped);
     if (pass == 0) figures->energy_start = figures->energy;
     figures->normal_passes = pass;
-    if (pass == opt->normal_passes || (pass > 0 && figures->normal_change < opt->normal_tol_rad)) return worst;
-    batten_status st = batten_progress(ctx, "normals", (double)pass / opt->normal_passes);
-    if (st < 0) return st;
-    batten_parallel(ctx, task_count(job->t->nodes), assemble, job);
-    st = plan ? solve_direct(ctx, job, plan, figures)
-              : solve_cg(ctx, job, pass_tolerance(opt, pass ? figures->normal_change : TURN_MAX), figures);
+    if (pass == passes || (pass > 0 && figures->normal_change < job->opt->normal_tol_rad)) return worst;
+    double before = figures->normal_change;
+    batten_status st = solve_pass(ctx, job, plan, pass ? before : TURN_MAX, figures);
     if (st < 0) return st;
     if (st > worst) worst = st;
-    double before = figures->normal_change;
     figures->normal_change = move_normals(ctx, job);
     if (pass > 0 && figures->normal_change > before) job->turn_max = 0.5 * fmin(job->turn_max, before);
   }
+}
+
+/* Lengths by curvatures follow the normals so violently (a third of their value and more, where the estimates of two
+ * ends do not go together) that nothing converges with them. They have the last pass; the turn that is told is that
+ * of the passes before, which have L2. */
+static batten_status optimise(batten_context *ctx, g1_job *job, block_plan *plan, net_figures *figures) {
+  const batten_network_options *opt = job->opt;
+  job->length = opt->length;
+  if (!is_curved(opt->length) || opt->normal_passes == 0) return iterate(ctx, job, plan, opt->normal_passes, figures);
+  job->length = BATTEN_LENGTH_L2;
+  batten_status before = iterate(ctx, job, plan, opt->normal_passes - 1, figures);
+  if (before < 0) return before;
+  job->length = opt->length;
+  prepare_pass(ctx, job, &figures->energy, &figures->clamped);
+  batten_status st = solve_pass(ctx, job, plan, TURN_MAX, figures);
+  if (st < 0) return st;
+  double turn = move_normals(ctx, job);
+  if (opt->normal_passes == 1) figures->normal_change = turn;
+  prepare_pass(ctx, job, &figures->energy, &figures->clamped);
+  figures->normal_passes++;
+  return st > before ? st : before;
 }
 
 /* What a pass works on; passes = 0 needs no system. */
@@ -343,12 +378,11 @@ static batten_status take_memory(batten_context *ctx, g1_job *job) {
   const net_topology *t = job->t;
   const batten_network_options *opt = job->opt;
   size_t tasks = task_count(t->nodes > t->edges ? t->nodes : t->edges);
-  bool curved = opt->length == BATTEN_LENGTH_L3 || opt->length == BATTEN_LENGTH_L4;
   bool beltrami = opt->functional == BATTEN_FUNCTIONAL_LAPLACE_BELTRAMI;
   if (!(job->nodes = batten_alloc_array(ctx, t->nodes, sizeof *job->nodes)) ||
       !(job->part = batten_alloc_array(ctx, tasks, sizeof *job->part)) ||
       !(job->substitute = batten_alloc_array(ctx, tasks, sizeof *job->substitute)) ||
-      (curved && !(job->forms = batten_alloc_array(ctx, t->nodes, 3 * sizeof *job->forms))) ||
+      (is_curved(opt->length) && !(job->forms = batten_alloc_array(ctx, t->nodes, 3 * sizeof *job->forms))) ||
       (beltrami && !(job->terms = batten_alloc_array(ctx, t->edges, sizeof *job->terms))))
     return BATTEN_E_NOMEM;
   if (opt->normal_passes == 0) return BATTEN_OK;
@@ -366,7 +400,7 @@ batten_status net_g1(batten_context *ctx, const net_topology *t, const batten_ne
   batten_status st = take_memory(ctx, &job);
   if (st == BATTEN_OK && opt->normal_passes && opt->solver == BATTEN_NETWORK_DIRECT)
     st = block_plan_new(ctx, &job.a, BLOCK_AUTO, &plan);
-  if (st == BATTEN_OK) st = iterate(ctx, &job, plan, figures);
+  if (st == BATTEN_OK) st = optimise(ctx, &job, plan, figures);
   block_plan_free(ctx, plan);
   block_matrix_free(ctx, &job.a);
   batten_free(ctx, job.x);
