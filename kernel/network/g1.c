@@ -334,15 +334,15 @@ static batten_status solve_pass(batten_context *ctx, g1_job *job, block_plan *pl
   return plan ? solve_direct(ctx, job, plan, figures) : solve_cg(ctx, job, pass_tolerance(job->opt, turn), figures);
 }
 
-static batten_status iterate(batten_context *ctx, g1_job *job, block_plan *plan, unsigned passes,
-                             net_figures *figures) {
+static batten_status iterate(batten_context *ctx, g1_job *job, block_plan *plan, net_figures *figures) {
   batten_status worst = BATTEN_OK;
   job->turn_max = TURN_MAX;
   for (unsigned pass = 0;; pass++) {
     prepare_pass(ctx, job, &figures->energy, &figures->clamped);
     if (pass == 0) figures->energy_start = figures->energy;
     figures->normal_passes = pass;
-    if (pass == passes || (pass > 0 && figures->normal_change < job->opt->normal_tol_rad)) return worst;
+    if (pass == job->opt->normal_passes || (pass > 0 && figures->normal_change < job->opt->normal_tol_rad))
+      return worst;
     double before = figures->normal_change;
     batten_status st = solve_pass(ctx, job, plan, pass ? before : TURN_MAX, figures);
     if (st < 0) return st;
@@ -352,25 +352,17 @@ static batten_status iterate(batten_context *ctx, g1_job *job, block_plan *plan,
   }
 }
 
-/* Lengths by curvatures follow the normals so violently (a third of their value and more, where the estimates of two
- * ends do not go together) that nothing converges with them. They have the last pass; the turn that is told is that
- * of the passes before, which have L2. */
+/* Lengths by curvatures follow the normals so violently (by a third of their value, where the estimates of two ends
+ * do not go together) that with them nothing converges, and a single pass with them loses half of what the others
+ * gained. So they make the curves, but not the normals: those are optimised with L2. */
 static batten_status optimise(batten_context *ctx, g1_job *job, block_plan *plan, net_figures *figures) {
-  const batten_network_options *opt = job->opt;
-  job->length = opt->length;
-  if (!is_curved(opt->length) || opt->normal_passes == 0) return iterate(ctx, job, plan, opt->normal_passes, figures);
-  job->length = BATTEN_LENGTH_L2;
-  batten_status before = iterate(ctx, job, plan, opt->normal_passes - 1, figures);
-  if (before < 0) return before;
-  job->length = opt->length;
+  bool curved = is_curved(job->opt->length);
+  job->length = curved ? BATTEN_LENGTH_L2 : job->opt->length;
+  batten_status st = iterate(ctx, job, plan, figures);
+  if (st < 0 || !curved) return st;
+  job->length = job->opt->length;
   prepare_pass(ctx, job, &figures->energy, &figures->clamped);
-  batten_status st = solve_pass(ctx, job, plan, TURN_MAX, figures);
-  if (st < 0) return st;
-  double turn = move_normals(ctx, job);
-  if (opt->normal_passes == 1) figures->normal_change = turn;
-  prepare_pass(ctx, job, &figures->energy, &figures->clamped);
-  figures->normal_passes++;
-  return st > before ? st : before;
+  return st;
 }
 
 /* What a pass works on; passes = 0 needs no system. */
