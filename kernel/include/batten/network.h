@@ -30,7 +30,7 @@ typedef enum batten_network_fill {
   BATTEN_FILL_PETERS,      /* one quintic a facet [after Peters 1991]; not exactly G1: its residual is told */
   BATTEN_FILL_DEGREE7,     /* one patch of degree 7 a facet [section 6], DEGREE6 where that would be singular */
   BATTEN_FILL_DEGREE6,     /* three patches of degree 6 a facet */
-  BATTEN_FILL_PN           /* one cubic a facet [Vlachos et al. 2001]: only G0, for comparison */
+  BATTEN_FILL_PN /* one cubic a facet from estimated normals [Vlachos et al. 2001]: only G0, for comparison */
 } batten_network_fill;
 
 typedef enum batten_normal_weights {                           /* of the triangles' normals at a vertex */
