@@ -46,11 +46,12 @@ static bool direction_at(const double *chord, const double *normal, const double
 
 /* The arc of a circle from the chord's start to its end that leaves along the unit vector d. */
 static double arc_length(const double *d, const double *chord) {
-  double across[3];
+  double across[3], size = vec_norm(chord);
   vec_cross(d, chord, across);
-  double angle = fmin(atan2(vec_norm(across), vec_dot(d, chord)), ARC_ANGLE_MAX);
-  double stretch = angle < 1e-4 ? 1 + angle * angle / 6 : angle / sin(angle);
-  return vec_norm(chord) * stretch;
+  double sine = vec_norm(across) / size, angle = atan2(sine, vec_dot(d, chord) / size);
+  /* What rounding does to a small sine it does to the angle too. */
+  if (angle > ARC_ANGLE_MAX) return size * ARC_ANGLE_MAX / sin(ARC_ANGLE_MAX);
+  return sine > 1e-4 ? size * angle / sine : size * (1 + sine * sine / 6);
 }
 
 /* Newton's method for the two equations above; l in: where to start. False when it does not end near there. */
