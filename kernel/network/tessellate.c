@@ -2,11 +2,12 @@
  *
  * Every edge, of the mesh and inside split facets, has a number of segments that both of its patches know, so that
  * they meet in the same vertices; a patch whose edges differ is joined to them by strips (pattern.h). On a triangle
- * within which no two places differ by more than 1 / N in a barycentric coordinate, linear interpolation is off by
- *   sum_i l_i |Q(x_i - x)| / 2 <= (1/2) (4/9) (5/4) M / N^2,
- * where M bounds the second derivative along the three edges' directions, |Q| <= 5/4 M in all others of that size,
- * and sum l_i |x_i - x|^2 <= sum l_i (1 - l_i)^2 <= 4/9: N follows from the tolerance, with M from the control
- * points' second differences; an edge takes the larger N of its two patches. */
+ * with corners x_i the linear interpolant of a quadratic is off by
+ *   sum_(i < j) l_i l_j |Q(x_i - x_j)| / 2 <= (1/6) (5/4) M d^2,
+ * where sum l_i l_j <= 1/3, d is the largest difference of a barycentric coordinate, M bounds the second derivative
+ * along the three edges' directions, and |Q| <= 5/4 M in all others of that size. In lattices d = 1 / N; in strips,
+ * whose triangles lean, up to about sqrt2 / N. So N^2 = (5/12) M / tolerance, with M from the second differences of
+ * the control points, and an edge takes the larger N of its two patches. */
 #include "base/checked.h"
 #include "mesh/mesh_inner.h"
 #include "network/pattern.h"
@@ -16,7 +17,7 @@
 #include <string.h>
 
 enum { DENSITY_MAX = 512, FACES_PER_TASK = 32 };
-static const double ERROR_FACTOR = 5. / 18;
+static const double ERROR_FACTOR = 5. / 12;
 
 batten_tessellate_options batten_tessellate_options_default(void) {
   return (batten_tessellate_options){.struct_size = sizeof(batten_tessellate_options), .density = 8};
