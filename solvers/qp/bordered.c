@@ -9,7 +9,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "band.h"
+#include "sparse/band.h"
 #include "base/checked.h"
 #include "kkt.h"
 #include "la/la.h"
@@ -67,7 +67,7 @@ static size_t keep_long_rows(const qp_csr *c, unsigned char *keep) {
 }
 
 /* Unknowns with very many neighbours in the condensed pattern. */
-static size_t drop_busy_unknowns(const qp_graph *g, unsigned char *drop) {
+static size_t drop_busy_unknowns(const sparse_graph *g, unsigned char *drop) {
   const double FACTOR = 8;
   size_t dropped = 0;
   double mean = g->count ? (double)g->starts[g->count] / (double)g->count : 0, limit = fmax(64, FACTOR * mean);
@@ -82,7 +82,7 @@ static size_t drop_busy_unknowns(const qp_graph *g, unsigned char *drop) {
 static batten_status order(batten_context *ctx, qp_bordered *f, double most_flops) {
   const size_t MOST_BORDER = 256;
   size_t n = f->n, m = f->m, most;
-  qp_graph g = {0};
+  sparse_graph g = {0};
   uint32_t *sequence = NULL;
   unsigned char *drop = NULL, *keep = batten_alloc(ctx, m);
   if (!keep) return BATTEN_E_NOMEM;
@@ -102,11 +102,11 @@ static batten_status order(batten_context *ctx, qp_bordered *f, double most_flop
   st = BATTEN_E_TOO_LARGE;
   if (kept + f->unknowns > MOST_BORDER) goto done;
   if (f->unknowns) {
-    qp_graph_free(ctx, &g);
+    sparse_graph_free(ctx, &g);
     st = qp_graph_condensed(ctx, &f->h, &f->c, keep, drop, most, &g);
     if (st < 0) goto done;
   }
-  st = qp_order_band(ctx, &g, sequence, &f->width);
+  st = sparse_order_band(ctx, &g, sequence, &f->width);
   if (st < 0) goto done;
   f->band = n - f->unknowns;
   f->border = f->unknowns + kept;
@@ -120,7 +120,7 @@ static batten_status order(batten_context *ctx, qp_bordered *f, double most_flop
     f->flops += keep[i] ? length : length * (length + 1);
   }
 done:
-  qp_graph_free(ctx, &g);
+  sparse_graph_free(ctx, &g);
   batten_free(ctx, sequence);
   batten_free(ctx, drop);
   batten_free(ctx, keep);
@@ -261,12 +261,12 @@ size_t qp_bordered_factor(qp_bordered *f, const double *d, const double *w) {
     assemble(f, d, w, shift);
     if (repaired == 0)
       for (size_t j = 0; j < f->band; j++) top = fmax(top, f->b[j * (f->width + 1)]);
-    if (qp_band_cholesky(f->band, f->width, f->b) == 0 || !isfinite(top) || !(shift < top)) break;
+    if (sparse_band_cholesky(f->band, f->width, f->b) == 0 || !isfinite(top) || !(shift < top)) break;
     repaired++; /* rounding has eaten a pivot: all unknowns are held more tightly, refinement takes it out again */
   }
   if (f->border == 0) return repaired;
   for (size_t k = 0; k < f->border; k++) f->s_diagonal[k] = f->s[k * f->border + k];
-  for (size_t k = 0; k < f->border; k++) qp_band_forward(f->band, f->width, f->b, f->e + k * f->band);
+  for (size_t k = 0; k < f->border; k++) sparse_band_forward(f->band, f->width, f->b, f->e + k * f->band);
   batten_la_syrk(BATTEN_LA_DOUBLE, 'L', 'T', f->border, f->band, -1, f->e, f->band, 1, f->s, f->border);
   for (size_t k = f->unknowns; k < f->border; k++) f->s_diagonal[k] = f->s[k * f->border + k]; /* only grows */
   return repaired + border_factor(f);
@@ -283,13 +283,13 @@ void qp_bordered_solve(qp_bordered *f, double *r, double *s, double *to) {
     double v = s[i] * f->inverse[i];
     for (size_t e = f->starts[i]; e < f->starts[i + 1]; e++) x[f->sorted[e]] += v * f->values[e];
   }
-  qp_band_forward(f->band, f->width, f->b, x);
+  sparse_band_forward(f->band, f->width, f->b, x);
   if (f->border) {
     batten_la_gemv(BATTEN_LA_DOUBLE, 'T', f->band, f->border, -1, f->e, f->band, x, 1, border);
     border_solve(f, border);
     batten_la_gemv(BATTEN_LA_DOUBLE, 'N', f->band, f->border, -1, f->e, f->band, border, 1, x);
   }
-  qp_band_backward(f->band, f->width, f->b, x);
+  sparse_band_backward(f->band, f->width, f->b, x);
   for (size_t j = 0; j < f->n; j++) r[j] = x[f->place[j]];
   for (size_t i = 0; i < f->m; i++) {
     double sum = 0;

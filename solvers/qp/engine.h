@@ -6,7 +6,8 @@
  *   proximal.c     the dense engines on a strictly convex problem, or on a sequence of such
  *     dual.c (pricing.c), primal.c (phase1.c, search.c), both on active.c: 1/2 |R x - c|^2
  *   interior.c     1/2 x'Hx + g'x on sparse rows: scaled.c, newton.c, polish.c, proof.c
- *     kkt.c          its linear systems: bordered.c and band.c, or ldl.c and degree.c; ordering.c
+ *     kkt.c          its linear systems: bordered.c or ldl.c, orders and bands from
+ *                    solvers/sparse; pattern.c
  *   refine.c digits.c   the last digits on a working set, and below the rounding of x and y
  *   certify.c    residuals, certificates, rays from the caller's data alone
  *   exact.c      the blend with a strictly feasible point

@@ -12,7 +12,7 @@
 
 #include <stdbool.h>
 
-#include "ordering.h"
+#include "pattern.h"
 
 typedef struct qp_ldl qp_ldl;
 typedef struct qp_bordered qp_bordered;

@@ -131,7 +131,7 @@ static batten_status symbolic(batten_context *ctx, qp_ldl *f, uint32_t *parent, 
 
 batten_status qp_ldl_new(batten_context *ctx, const qp_csr *h, const qp_csr *c, qp_ldl **out) {
   size_t n = c->columns, m = c->rows, all = n + m;
-  qp_graph g = {0};
+  sparse_graph g = {0};
   uint32_t *place = NULL, *mark = NULL;
   qp_ldl *f = batten_alloc(ctx, sizeof *f);
   if (!f) return BATTEN_E_NOMEM;
@@ -145,7 +145,7 @@ batten_status qp_ldl_new(batten_context *ctx, const qp_csr *h, const qp_csr *c, 
   if (!mark) goto done;
   st = qp_graph_augmented(ctx, h, c, &g);
   if (st < 0) goto done;
-  st = qp_order_degree(ctx, &g, f->order);
+  st = sparse_order_degree(ctx, &g, f->order);
   if (st < 0) goto done;
   for (size_t k = 0; k < all; k++) place[f->order[k]] = (uint32_t)k;
   st = permute(ctx, f, h, c, place);
@@ -155,7 +155,7 @@ batten_status qp_ldl_new(batten_context *ctx, const qp_csr *h, const qp_csr *c, 
   *out = f;
   f = NULL;
 done:
-  qp_graph_free(ctx, &g);
+  sparse_graph_free(ctx, &g);
   batten_free(ctx, mark);
   batten_free(ctx, place);
   qp_ldl_free(ctx, f);

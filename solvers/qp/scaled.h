@@ -3,7 +3,7 @@
 #define BATTEN_QP_SCALED_H
 
 #include "engine.h"
-#include "ordering.h"
+#include "pattern.h"
 
 /* min 1/2 x'Hx + g'x,  lower <= rows <= upper. The first `general` rows are those of c; row general + b is the
  * unknown column[b] itself. With the engine's problem marked by ~: x~ = e x,  H = cost e H~ e,  g = cost e g~,  row =

@@ -25,12 +25,12 @@ double block_front_seconds(double own, double below) {
   return FLOP * block_front_flops(own, below) + ENTRY * (own * (own + below) + below * below) + FRONT;
 }
 
-batten_status block_graph(batten_context *ctx, const block_matrix *a, qp_graph *out) {
-  qp_graph g = {.count = a->rows};
+batten_status block_graph(batten_context *ctx, const block_matrix *a, sparse_graph *out) {
+  sparse_graph g = {.count = a->rows};
   g.starts = batten_alloc_array(ctx, a->rows + 1, sizeof *g.starts);
   g.indices = g.starts ? batten_alloc_array(ctx, a->starts[a->rows] - a->rows, sizeof *g.indices) : NULL;
   if (!g.indices) {
-    qp_graph_free(ctx, &g);
+    sparse_graph_free(ctx, &g);
     return BATTEN_E_NOMEM;
   }
   size_t at = 0;
@@ -46,7 +46,7 @@ batten_status block_graph(batten_context *ctx, const block_matrix *a, qp_graph *
 
 /* Arrays of the analysis, one entry a node. */
 typedef struct analysis {
-  const qp_graph *g;
+  const sparse_graph *g;
   uint32_t *order, *place; /* node at a place; place of a node */
   uint32_t *parent;        /* of places, then of supernodes */
   uint32_t *below;         /* rows below the diagonal: of places, then of supernodes */
@@ -290,7 +290,7 @@ static bool take_fronts(batten_context *ctx, size_t n, block_fronts *f) {
          (f->panel = batten_alloc_array(ctx, n + 1, sizeof *f->panel));
 }
 
-batten_status block_fronts_new(batten_context *ctx, const qp_graph *g, unsigned size, const uint32_t *order,
+batten_status block_fronts_new(batten_context *ctx, const sparse_graph *g, unsigned size, const uint32_t *order,
                                block_fronts *out) {
   size_t n = g->count;
   block_fronts f = {.nodes = n, .size = size};

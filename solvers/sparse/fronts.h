@@ -8,7 +8,7 @@
 #define BATTEN_SPARSE_FRONTS_H
 
 #include "block.h"
-#include "qp/ordering.h"
+#include "order.h"
 
 /* Numbers count nodes unless said otherwise. */
 typedef struct block_fronts {
@@ -42,12 +42,10 @@ double block_front_flops(double own, double below);
 double block_front_seconds(double own, double below);
 
 /* Neighbours of all nodes. */
-batten_status block_graph(batten_context *ctx, const block_matrix *a, qp_graph *out);
-/* Order of elimination by nested dissection: order[place] = node. */
-batten_status block_order_dissection(batten_context *ctx, const qp_graph *g, uint32_t *order);
+batten_status block_graph(batten_context *ctx, const block_matrix *a, sparse_graph *out);
 /* Supernodes of the factor in this order of elimination, [rows], which is changed into an equivalent one. TOO_LARGE:
  * more than size_t or 32 bits can count. */
-batten_status block_fronts_new(batten_context *ctx, const qp_graph *g, unsigned size, const uint32_t *order,
+batten_status block_fronts_new(batten_context *ctx, const sparse_graph *g, unsigned size, const uint32_t *order,
                                block_fronts *out);
 /* Where the matrix's blocks go. */
 batten_status block_fronts_place(batten_context *ctx, const block_matrix *a, block_fronts *f);

@@ -1,18 +1,18 @@
-/* Cholesky of block systems: which way is cheaper, and the band. A band after reverse
- * Cuthill-McKee is for long thin meshes; everything else is for the fronts, see fronts.h. */
+/* Cholesky of block systems: which way is cheaper, and the band. A band after reverse Cuthill-McKee is for
+ * long thin meshes; everything else is for the fronts, see fronts.h. */
 #include "block.h"
 
 #include <assert.h>
 #include <string.h>
 
 #include "base/checked.h"
+#include "band.h"
 #include "fronts.h"
-#include "qp/band.h"
 
 typedef struct band {
   uint32_t *place; /* [rows] */
   size_t n, width; /* unknowns, diagonals beside the main one */
-  double *factor;  /* [n][width + 1], see qp/band.h */
+  double *factor;  /* [n][width + 1], see band.h */
   double *vector;  /* [n] */
 } band;
 
@@ -65,7 +65,7 @@ static size_t band_factor(const block_matrix *a, band *b) {
         for (size_t c = q == p ? r : 0; c < size; c++)
           b->factor[(p * size + r) * ld + (q - p) * size + c - r] = block[r * size + c];
     }
-  size_t bad = qp_band_cholesky(b->n, b->width, b->factor);
+  size_t bad = sparse_band_cholesky(b->n, b->width, b->factor);
   for (size_t j = 0; j < b->n && !bad; j++) /* some BLAS let NaN pass */
     if (!isfinite(b->factor[j * ld])) bad = j + 1;
   for (size_t i = 0; bad && i < a->rows; i++)
@@ -75,15 +75,15 @@ static size_t band_factor(const block_matrix *a, band *b) {
 
 static void band_solve(const band *b, size_t rows, size_t size, double *x) {
   for (size_t i = 0; i < rows; i++) memcpy(b->vector + b->place[i] * size, x + i * size, size * sizeof *x);
-  qp_band_forward(b->n, b->width, b->factor, b->vector);
-  qp_band_backward(b->n, b->width, b->factor, b->vector);
+  sparse_band_forward(b->n, b->width, b->factor, b->vector);
+  sparse_band_backward(b->n, b->width, b->factor, b->vector);
   for (size_t i = 0; i < rows; i++) memcpy(x + i * size, b->vector + b->place[i] * size, size * sizeof *x);
 }
 
 /* Fronts after dissection, where these are cheaper than those at hand. */
-static batten_status try_dissection(batten_context *ctx, const qp_graph *g, block_plan *plan, uint32_t *order) {
+static batten_status try_dissection(batten_context *ctx, const sparse_graph *g, block_plan *plan, uint32_t *order) {
   block_fronts fronts;
-  batten_status st = block_order_dissection(ctx, g, order);
+  batten_status st = sparse_order_dissection(ctx, g, order);
   if (st >= 0) st = block_fronts_new(ctx, g, plan->size, order, &fronts);
   if (st < 0) return st;
   if (fronts.seconds < plan->fronts.seconds) {
@@ -99,17 +99,16 @@ static batten_status try_dissection(batten_context *ctx, const qp_graph *g, bloc
 static batten_status choose(batten_context *ctx, const block_matrix *a, block_plan *plan) {
   enum { DISSECTED = 500 }; /* rows: from here on dissection can win */
   batten_status st = BATTEN_E_NOMEM;
-  qp_graph g = {0};
+  sparse_graph g = {0};
   size_t apart = 0, rows = a->rows;
   uint32_t *in_band = batten_alloc_array(ctx, rows, sizeof *in_band), *order = NULL;
   if (!in_band) goto done;
   order = batten_alloc_array(ctx, rows, sizeof *order);
   if (!order) goto done;
   st = block_graph(ctx, a, &g);
-  if (st >= 0 && plan->method != BLOCK_SUPERNODAL) st = qp_order_band(ctx, &g, in_band, &apart);
+  if (st >= 0 && plan->method != BLOCK_SUPERNODAL) st = sparse_order_band(ctx, &g, in_band, &apart);
   if (st >= 0 && plan->method != BLOCK_BAND) {
-    st = qp_order_degree(ctx, &g, order);
-    qp_graph_free(ctx, &g);
+    st = sparse_order_degree(ctx, &g, order);
     if (st >= 0) st = block_graph(ctx, a, &g);
     if (st >= 0) st = block_fronts_new(ctx, &g, plan->size, order, &plan->fronts);
     if (st >= 0 && rows > DISSECTED) st = try_dissection(ctx, &g, plan, order);
@@ -128,7 +127,7 @@ static batten_status choose(batten_context *ctx, const block_matrix *a, block_pl
   st = block_fronts_place(ctx, a, &plan->fronts);
   if (st >= 0) st = block_work_new(ctx, &plan->fronts, &plan->work);
 done:
-  qp_graph_free(ctx, &g);
+  sparse_graph_free(ctx, &g);
   batten_free(ctx, order);
   batten_free(ctx, in_band);
   return st;

@@ -4,7 +4,7 @@
 #include "tap.h"
 
 #include "la/la.h"
-#include "qp/band.h"
+#include "sparse/band.h"
 #include "qp/kkt.h"
 
 static double *random_band(size_t n, size_t width, uint64_t *seed) {
@@ -26,16 +26,16 @@ static void test_kernels(void) {
     double *x = malloc(n * sizeof *x), *r = malloc(n * sizeof *r), apart = 0, worst = 0;
     memcpy(b, a, n * ld * sizeof *b);
     memcpy(c, a, n * ld * sizeof *c);
-    size_t bad = qp_band_cholesky_narrow(n, width, b) + batten_la_pbtrf('L', n, width, c, ld);
+    size_t bad = sparse_band_cholesky_narrow(n, width, b) + batten_la_pbtrf('L', n, width, c, ld);
     for (size_t j = 0; j < n; j++)
       for (size_t i = 0; i <= width && i + j < n; i++) apart = fmax(apart, fabs(b[j * ld + i] - c[j * ld + i]));
     T_RATIO(bad ? INFINITY : apart, 1e-14 * (1 + (double)width),
             "n = %zu, width %zu: the kernel's factor is LAPACK's", n, width);
     memcpy(c, a, n * ld * sizeof *c);
-    qp_band_cholesky(n, width, c);
+    sparse_band_cholesky(n, width, c);
     for (size_t j = 0; j < n; j++) x[j] = r[j] = t_uniform(&seed) - 0.5;
-    qp_band_forward(n, width, c, x);
-    qp_band_backward(n, width, c, x);
+    sparse_band_forward(n, width, c, x);
+    sparse_band_backward(n, width, c, x);
     for (size_t j = 0; j < n; j++)
       for (size_t i = 0; i <= width && i + j < n; i++) {
         r[i + j] -= a[j * ld + i] * x[j];
@@ -46,10 +46,10 @@ static void test_kernels(void) {
     free(a), free(b), free(c), free(x), free(r);
   }
   double bad[] = {1, 2, 1, 0}; /* [1 2; 2 1] */
-  T_CHECK(qp_band_cholesky_narrow(2, 1, bad) == 2, "the second pivot of an indefinite matrix is named");
+  T_CHECK(sparse_band_cholesky_narrow(2, 1, bad) == 2, "the second pivot of an indefinite matrix is named");
   double nan[] = {NAN, 0, 1, 0};
-  T_CHECK(qp_band_cholesky_narrow(2, 1, nan) == 1, "a pivot that is no number is named");
-  T_CHECK(qp_band_cholesky(0, 3, NULL) == 0, "nothing to factor");
+  T_CHECK(sparse_band_cholesky_narrow(2, 1, nan) == 1, "a pivot that is no number is named");
+  T_CHECK(sparse_band_cholesky(0, 3, NULL) == 0, "nothing to factor");
 }
 
 /* ---- sparse matrices ---- */
@@ -236,20 +236,20 @@ static void test_orders(void) {
     qp_csr none = {0, n, &none_start, NULL, NULL};
     batten_context *ctx = t_context(NULL, NULL, 1);
     uint32_t *order = malloc(n * sizeof *order);
-    qp_graph g = {0};
+    sparse_graph g = {0};
     T_OK(qp_graph_condensed(ctx, &h.view, &none, NULL, NULL, SIZE_MAX, &g), ctx);
-    T_OK(qp_order_band(ctx, &g, order, &width), ctx);
+    T_OK(sparse_order_band(ctx, &g, order, &width), ctx);
     T_CHECK(is_permutation(n, order) && width <= cases[t].width + 1,
             "%zu grids of %zu x %zu: bandwidth %zu, shuffled from %zu", cases[t].parts, cases[t].rows,
             cases[t].columns, width, cases[t].width);
-    T_OK(qp_order_degree(ctx, &g, order), ctx);
+    T_OK(sparse_order_degree(ctx, &g, order), ctx);
     T_CHECK(is_permutation(n, order), "minimum degree numbers each once");
     qp_ldl *ldl = NULL;
     T_OK(qp_ldl_new(ctx, &h.view, &none, &ldl), ctx);
     double log_n = log2((double)n + 2);
     T_RATIO(qp_ldl_flops(ldl), 2 * pow((double)n, 1.5) * log_n, "n = %zu: fill as of a good order", n);
     qp_ldl_free(ctx, ldl);
-    qp_graph_free(ctx, &g);
+    sparse_graph_free(ctx, &g);
     T_CHECK(batten_bytes_in_use(ctx) == 0, "all memory is back");
     batten_context_free(ctx);
     free(order);

@@ -138,14 +138,14 @@ static void test_dissection(batten_context *ctx) {
       }
     if (kind != 1) scene_shuffle(&g, &seed);
     block_matrix a;
-    qp_graph graph;
+    sparse_graph graph;
     block_fronts fronts;
     uint32_t *order = malloc(g.rows * sizeof *order);
     unsigned char *met = calloc(g.rows, 1);
     bool once = true;
     T_OK(block_matrix_new(ctx, g.rows, 1, g.pair_count, g.pairs, &a), ctx);
     T_OK(block_graph(ctx, &a, &graph), ctx);
-    T_OK(block_order_dissection(ctx, &graph, order), ctx);
+    T_OK(sparse_order_dissection(ctx, &graph, order), ctx);
     for (size_t p = 0; p < g.rows; p++) {
       once = once && order[p] < g.rows && !met[order[p]];
       if (once) met[order[p]] = 1;
@@ -158,7 +158,7 @@ static void test_dissection(batten_context *ctx) {
               g.rows, fronts.height_most);
     if (kind == 2) T_RATIO(fronts.flops, 25 * 216 * (double)g.rows, "path: flops");
     block_fronts_free(ctx, &fronts);
-    qp_graph_free(ctx, &graph);
+    sparse_graph_free(ctx, &graph);
     block_matrix_free(ctx, &a);
     free(order), free(met), free(g.pairs);
   }

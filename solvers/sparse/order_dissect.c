@@ -17,7 +17,7 @@ enum { LEAF = 120 }; /* nodes: below, minimum degree is as good (measured on mes
 enum { SIDE_A = 0, SIDE_B = 1, SEPARATOR = 2 };
 
 typedef struct dissection {
-  const qp_graph *g;
+  const sparse_graph *g;
   uint32_t *order;              /* [n] parts are ranges of it; done at the end */
   uint32_t *part;               /* [n] stamp of the part that a node is in */
   uint32_t *level;              /* [n] of the last search; NONE: not reached */
@@ -220,7 +220,7 @@ static void arrange(dissection *d, size_t low, size_t count) {
 static batten_status order_leaf(batten_context *ctx, dissection *d, size_t low, size_t high) {
   uint32_t *nodes = d->order + low;
   size_t count = high - low, entries = 0;
-  qp_graph g = {.count = count};
+  sparse_graph g = {.count = count};
   batten_status st = BATTEN_E_NOMEM;
   if (count < 3) return BATTEN_OK;
   for (size_t i = 0; i < count; i++) {
@@ -239,12 +239,12 @@ static batten_status order_leaf(batten_context *ctx, dissection *d, size_t low, 
       if (d->part[d->g->indices[e]] == d->stamp) g.indices[entries++] = d->level[d->g->indices[e]];
   }
   g.starts[count] = entries;
-  st = qp_order_degree(ctx, &g, d->separator);
+  st = sparse_order_degree(ctx, &g, d->separator);
   if (st < 0) goto done;
   for (size_t i = 0; i < count; i++) d->queue[i] = nodes[d->separator[i]];
   memcpy(nodes, d->queue, count * sizeof *nodes);
 done:
-  qp_graph_free(ctx, &g);
+  sparse_graph_free(ctx, &g);
   return st;
 }
 
@@ -269,7 +269,7 @@ static batten_status dissect_part(batten_context *ctx, dissection *d, size_t low
   return BATTEN_OK;
 }
 
-batten_status block_order_dissection(batten_context *ctx, const qp_graph *g, uint32_t *order) {
+batten_status sparse_order_dissection(batten_context *ctx, const sparse_graph *g, uint32_t *order) {
   enum { ARRAYS = 6 };
   size_t n = g->count;
   dissection d = {.g = g, .order = order};

@@ -9,7 +9,7 @@
 #include <string.h>
 
 #include "base/checked.h"
-#include "ordering.h"
+#include "order.h"
 
 static const uint32_t NONE = UINT32_MAX;
 
@@ -268,9 +268,12 @@ static void write_order(quotient *q, const uint32_t *pivots, size_t count, uint3
 /* Nodes that meet a large part of all come last: they would only make every degree the same. */
 static bool dense(size_t n, size_t degree) { return degree > 16 && (double)degree > 10 * sqrt((double)n); }
 
-batten_status qp_order_degree(batten_context *ctx, qp_graph *g, uint32_t *order) {
+batten_status sparse_order_degree(batten_context *ctx, sparse_graph *g, uint32_t *order) {
   size_t n = g->count, entries = n ? g->starts[n] : 0, count = 0, bytes;
-  if (n == 0) return BATTEN_OK;
+  if (n == 0) {
+    sparse_graph_free(ctx, g);
+    return BATTEN_OK;
+  }
   const size_t WORDS = 10, LONG_WORDS = 3;
   batten_status st = BATTEN_E_NOMEM;
   uint64_t *longs = NULL;
@@ -298,7 +301,7 @@ batten_status qp_order_degree(batten_context *ctx, qp_graph *g, uint32_t *order)
     q.length[i] = q.degree[i] = (uint32_t)(g->starts[i + 1] - g->starts[i]);
     q.weight[i] = 1;
   }
-  qp_graph_free(ctx, g);
+  sparse_graph_free(ctx, g);
   size_t last = 0; /* dense nodes, at the end of pivots */
   for (uint32_t i = 0; i < n; i++)
     if (dense(n, q.degree[i])) {
@@ -320,7 +323,7 @@ batten_status qp_order_degree(batten_context *ctx, qp_graph *g, uint32_t *order)
 free_lists:
   batten_free(ctx, lists);
 done:
-  qp_graph_free(ctx, g);
+  sparse_graph_free(ctx, g);
   batten_free(ctx, longs);
   batten_free(ctx, words);
   return st;

@@ -20,7 +20,7 @@ static int finish(size_t below, double *column) {
 
 static size_t least(size_t a, size_t b) { return a < b ? a : b; }
 
-size_t qp_band_cholesky_narrow(size_t n, size_t width, double *a) {
+size_t sparse_band_cholesky_narrow(size_t n, size_t width, double *a) {
   enum { BLOCK = 4 };
   const size_t ld = width + 1;
   for (size_t j = 0; j < n; j += BLOCK) {
@@ -62,9 +62,9 @@ size_t qp_band_cholesky_narrow(size_t n, size_t width, double *a) {
   return 0;
 }
 
-size_t qp_band_cholesky(size_t n, size_t width, double *a) {
+size_t sparse_band_cholesky(size_t n, size_t width, double *a) {
   const size_t BLOCKED = 72; /* LAPACK has blocks from 32 on, which pay from here on: measured */
-  size_t bad = width < BLOCKED ? qp_band_cholesky_narrow(n, width, a) : batten_la_pbtrf('L', n, width, a, width + 1);
+  size_t bad = width < BLOCKED ? sparse_band_cholesky_narrow(n, width, a) : batten_la_pbtrf('L', n, width, a, width + 1);
   for (size_t j = 0; j < n && !bad; j++) a[j * (width + 1)] = 1 / a[j * (width + 1)];
   return bad;
 }
@@ -136,7 +136,7 @@ static inline void backward_narrow(size_t columns, size_t width, const double *l
   }
 }
 
-void qp_band_forward(size_t n, size_t width, const double *l, double *x) {
+void sparse_band_forward(size_t n, size_t width, const double *l, double *x) {
   size_t done = 0;
   switch (width) {
     case 1:
@@ -157,7 +157,7 @@ void qp_band_forward(size_t n, size_t width, const double *l, double *x) {
   forward_from(done, n, width, l, x);
 }
 
-void qp_band_backward(size_t n, size_t width, const double *l, double *x) {
+void sparse_band_backward(size_t n, size_t width, const double *l, double *x) {
   size_t whole = n > width ? n - width : 0; /* columns with width entries below the diagonal */
   if (width == 0 || width > 4) whole = n;
   if (width > 0 && width <= 4) {
