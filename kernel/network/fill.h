@@ -29,7 +29,9 @@ typedef struct net_across {
  * at NET_DEGREE7_INTERIOR, are left as they are. No branches on data: as smooth as the data are, NaN where the
  * construction is singular. across [3] may be NULL. */
 void net_degree7_frame(const net_node *nodes, const net_ribbon *ribbons, double (*out)[3], net_across *across);
-/* Their three, by the least integral of S_xx^2 + 2 S_xy^2 + S_yy^2 over an equilateral parameter triangle. */
+/* Their three for the fair fill to start from, by the least integral of S_xx^2 + 2 S_xy^2 + S_yy^2 over an
+ * equilateral parameter triangle. (net_fill_degree7 takes fourth derivatives instead: fairer where nothing more is
+ * done.) */
 void net_degree7_interior(double (*net)[3]);
 static const unsigned char NET_DEGREE7_INTERIOR[3] = {17, 18, 23};
 /* The integers over 66 with which the 36 points count for b_322 (0 at the interior ones). Those for b_232 and b_223

@@ -201,7 +201,8 @@ static void part_make(const facet *s, unsigned k, double (*out)[WIDTH]) {
 
 /* ---- the least integral ------------------------------------------------------------------------- */
 
-/* system [UNKNOWNS][WIDTH] += half the integral's gradient. */
+/* system [UNKNOWNS][WIDTH] += half the integral's gradient, a symmetric matrix of which the upper triangle is kept.
+ */
 static void add_part(const double (*net)[WIDTH], double (*system)[WIDTH]) {
   for (unsigned p = 0; p < LOOSE; p++) {
     double image[WIDTH] = {0};
@@ -211,7 +212,7 @@ static void add_part(const double (*net)[WIDTH], double (*system)[WIDTH]) {
     }
     for (unsigned a = 0; a < UNKNOWNS; a++) {
       double factor = net[loose[p]][a];
-      for (unsigned y = 0; y < WIDTH && factor != 0; y++) system[a][y] += factor * image[y];
+      for (unsigned y = a; y < WIDTH && factor != 0; y++) system[a][y] += factor * image[y];
     }
   }
 }
@@ -220,8 +221,8 @@ static void add_part(const double (*net)[WIDTH], double (*system)[WIDTH]) {
 static void solve(double (*system)[WIDTH]) {
   for (unsigned c = 0; c < UNKNOWNS; c++)
     for (unsigned a = c + 1; a < UNKNOWNS; a++) {
-      double factor = system[a][c] / system[c][c];
-      for (unsigned y = c; y < WIDTH; y++) system[a][y] -= factor * system[c][y];
+      double factor = system[c][a] / system[c][c];
+      for (unsigned y = a; y < WIDTH; y++) system[a][y] -= factor * system[c][y];
     }
   for (unsigned a = UNKNOWNS; a-- > 0;)
     for (int x = 0; x < 3; x++) {
