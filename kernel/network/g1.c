@@ -25,9 +25,9 @@ enum { ITEMS_PER_TASK = 1024, CG_MOST = 200 };
 
 /* 45 degrees: no normal turns by more in a pass. Where the iteration converges, turns become smaller from pass to
  * pass. Where edges span a third of a sphere and more it may not: normals come to rest for some passes, then run off
- * and fold the network. So when the largest turn grows, the bound becomes half of what it was before, and again
- * whenever it goes on growing: the normals at fault stay near their place of rest, the others are free to converge.
- */
+ * and fold the network. So when the largest turn grows it becomes the bound, which is halved with this and every
+ * later pass: the normals at fault stay near their place of rest, the others, which converge faster than that, are
+ * free. */
 static const double TURN_MAX = 0.78539816339744830962;
 
 /* ---- functionals ---------------------------------------------------------------------------------- */
@@ -336,19 +336,21 @@ static batten_status solve_pass(batten_context *ctx, g1_job *job, block_plan *pl
 
 static batten_status iterate(batten_context *ctx, g1_job *job, block_plan *plan, net_figures *figures) {
   batten_status worst = BATTEN_OK;
+  bool grown = false;
   job->turn_max = TURN_MAX;
   for (unsigned pass = 0;; pass++) {
     prepare_pass(ctx, job, &figures->energy, &figures->clamped);
     if (pass == 0) figures->energy_start = figures->energy;
     figures->normal_passes = pass;
-    if (pass == job->opt->normal_passes || (pass > 0 && figures->normal_change < job->opt->normal_tol_rad))
-      return worst;
+    double turned = fmin(figures->normal_change, job->turn_max);
+    if (pass == job->opt->normal_passes || (pass > 0 && turned < job->opt->normal_tol_rad)) return worst;
     double before = figures->normal_change;
     batten_status st = solve_pass(ctx, job, plan, pass ? before : TURN_MAX, figures);
     if (st < 0) return st;
     if (st > worst) worst = st;
     figures->normal_change = move_normals(ctx, job);
-    if (pass > 0 && figures->normal_change > before) job->turn_max = 0.5 * fmin(job->turn_max, before);
+    grown |= pass > 0 && figures->normal_change > before;
+    if (grown) job->turn_max = 0.5 * fmin(job->turn_max, before);
   }
 }
 
