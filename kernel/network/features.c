@@ -2,13 +2,13 @@
  *
  * An end of a crease is an edge at one of its vertices. Its tangent is fixed before the normals are known:
  *   two ends that turn by no more than the corner angle are mates: both lie along the tangent of the circle through
- *   the three vertices;
+ *   the three vertices, corrected by how the circles change along the crease;
  *   a single end in the mesh's inside is a dart: the surface closes around it and tells the direction;
  *   all others are corners: an end lies along the tangent of the circle that continues the edge's other end, or along
  *   the edge when that is no better known.
  * The creases cut the fan of a vertex into sectors, which become the nodes. The tangents at its sides fix the plane
  * of a sector: wholly (NET_CORNER), or up to the turn about one line (NET_CREASED). The curvature of the crease,
- * which the surfaces on both sides share, is that of its cubic Hermite curves with lengths of arcs of circles. */
+ * which the surfaces on both sides share, is that of circles along its tangents through the next vertices. */
 #include "net.h"
 
 #include "base/checked.h"
@@ -37,6 +37,7 @@ typedef struct features {
   unsigned char *open;     /* [2 edges] non-zero: an end whose direction is free, at a dart */
   uint32_t *ends;          /* [most triangles at a vertex + 1] ends at the vertex in hand, counter-clockwise */
   unsigned char *straight; /* [as many] */
+  double *curvature;       /* [2 edges][3] scratch: curvature vectors at mates */
   double corner_angle;
 } features;
 
@@ -190,6 +191,60 @@ static void judge_vertex(features *f, uint32_t v) {
     join_ends(f, ends[0], ends[1], tangent);
 }
 
+/* out = curvature vector of the circle that leaves along the end's guide and comes to the other vertex. */
+static void end_curvature(const net_topology *t, uint32_t end, double *out) {
+  const double *d = t->guide + 3 * (size_t)end;
+  double chord[3];
+  end_chord(t, end, chord);
+  double square = vec_dot(chord, chord), along = vec_dot(chord, d);
+  for (int k = 0; k < 3; k++) out[k] = 2 * (chord[k] - along * d[k]) / square;
+}
+
+static double end_length(const net_topology *t, uint32_t end) {
+  double chord[3];
+  end_chord(t, end, chord);
+  return vec_norm(chord);
+}
+
+/* Change of the circles' curvature along the curve, out of the vertex of `end` over its edge, across the guide. False
+ * at the curve's last circle. */
+static bool end_slope(const features *f, uint32_t end, double *out) {
+  uint32_t far = end ^ 1, beyond = f->mate[far];
+  if (beyond == NET_NONE) return false;
+  const double *d = f->t->guide + 3 * (size_t)end, *here = f->curvature + 3 * (size_t)end,
+               *there = f->curvature + 3 * (size_t)far;
+  double back = end_length(f->t, f->mate[end]), step = end_length(f->t, end), next = end_length(f->t, beyond);
+  /* A circle has the curve's curvature at the middle of its three places. */
+  double distance = step + (next - step) / 3 - (step - back) / 3;
+  for (int k = 0; k < 3; k++) out[k] = (there[k] - here[k]) / distance;
+  double along = vec_dot(out, d);
+  for (int k = 0; k < 3; k++) out[k] -= along * d[k];
+  return true;
+}
+
+/* Along a curve of curvature k + s k' the circle through places at -h1, 0, h2 has a tangent at 0 that is off by
+ * h1 h2 k' / 6. k' is a mean of the changes on both sides, which is 0 as soon as one of them is or they disagree:
+ * tangents of straight lines and of circles stay as they are, to the last vertex. */
+static void refine_mates(features *f) {
+  static const double turn_max = 0.1; /* 6 degrees; more comes of noise */
+  net_topology *t = f->t;
+  for (uint32_t end = 0; end < 2 * t->edges; end++)
+    if (f->mate[end] != NET_NONE) end_curvature(t, end, f->curvature + 3 * (size_t)end);
+  for (uint32_t b = 0; b < 2 * t->edges; b++) {
+    uint32_t a = f->mate[b];
+    double back[3], on[3], tangent[3];
+    if (a == NET_NONE || b < a || !end_slope(f, a, back) || !end_slope(f, b, on)) continue;
+    double p = vec_norm(back), q = vec_norm(on), agree = -vec_dot(back, on); /* back counts from b to a */
+    if (!(agree > 0)) continue;
+    double factor = agree / (p * q) / (p + q) * end_length(t, a) * end_length(t, b) / 6;
+    for (int k = 0; k < 3; k++) tangent[k] = factor * (p * on[k] - q * back[k]);
+    double turn = vec_norm(tangent), part = turn > turn_max ? turn_max / turn : 1;
+    for (int k = 0; k < 3; k++) tangent[k] = t->guide[3 * (size_t)b + (size_t)k] - part * tangent[k];
+    vec_normalize(tangent);
+    join_ends(f, a, b, tangent);
+  }
+}
+
 /* Guides of ends without mates. */
 static void continue_ends(features *f) {
   net_topology *t = f->t;
@@ -283,44 +338,16 @@ static void settle_corner(features *f, uint32_t v) {
 
 /* ---- curvatures --------------------------------------------------------------------------------- */
 
-/* out = d with the length of the arc over the chord that leaves along d, L2 of the paper. */
-static void arc(const double *chord, const double *d, double *out) {
-  double angle = fmin(angle_between(chord, d), 2.6); /* a third of the arc stays within five chords */
-  double length = vec_norm(chord) * (angle < 1e-4 ? 1 + angle * angle / 6 : angle / sin(angle));
-  for (int k = 0; k < 3; k++) out[k] = length * d[k];
-}
-
-/* Curvature vectors at both ends of the cubic with C(0) = 0, C'(0) = T0, C(1) = E, C'(1) = -T1:
- * C''(0) = 6 E - 4 T0 + 2 T1, of which the part across T0 counts. */
-static void bend_edge(features *f, uint32_t e) {
-  net_topology *t = f->t;
-  double chord[2][3], d[2][3], tangent[2][3];
-  if (f->open[2 * e] && f->open[2 * e + 1]) return;
-  for (uint32_t s = 0; s < 2; s++) {
-    end_chord(t, 2 * e + s, chord[s]);
-    memcpy(d[s], t->guide + 6 * (size_t)e + 3 * s, sizeof d[s]);
-  }
-  for (int s = 0; s < 2; s++)
-    if (f->open[2 * e + (uint32_t)s]) mirror(chord[s], d[!s], d[s]);
-  for (int s = 0; s < 2; s++) arc(chord[s], d[s], tangent[s]);
-  for (uint32_t s = 0; s < 2; s++) {
-    if (f->open[2 * e + s]) continue;
-    double *bend = t->bend + 6 * (size_t)e + 3 * s, square = vec_dot(tangent[s], tangent[s]);
-    for (int k = 0; k < 3; k++) bend[k] = (6 * chord[s][k] - 4 * tangent[s][k] + 2 * tangent[!s][k]) / square;
-    double along = vec_dot(bend, d[s]);
-    for (int k = 0; k < 3; k++) bend[k] -= along * d[s][k];
-  }
-}
-
+/* With a tangent that is right, the circles to both sides tell k - h1 k' / 3 and k + h2 k' / 3. */
 static void find_bends(features *f) {
   net_topology *t = f->t;
-  for (uint32_t e = 0; e < t->edges; e++)
-    if (t->kind[e] == NET_CREASE) bend_edge(f, e);
-  for (uint32_t end = 0; end < 2 * t->edges; end++) {
-    uint32_t mate = f->mate[end];
-    if (mate == NET_NONE || mate < end) continue;
-    double *a = t->bend + 3 * (size_t)end, *b = t->bend + 3 * (size_t)mate;
-    for (int k = 0; k < 3; k++) a[k] = b[k] = 0.5 * (a[k] + b[k]);
+  for (uint32_t end = 0; end < 2 * t->edges; end++)
+    if (t->kind[end / 2] == NET_CREASE && !f->open[end]) end_curvature(t, end, t->bend + 3 * (size_t)end);
+  for (uint32_t b = 0; b < 2 * t->edges; b++) {
+    uint32_t a = f->mate[b];
+    if (a == NET_NONE || b < a) continue;
+    double *p = t->bend + 3 * (size_t)a, *q = t->bend + 3 * (size_t)b, h1 = end_length(t, a), h2 = end_length(t, b);
+    for (int k = 0; k < 3; k++) p[k] = q[k] = (h2 * p[k] + h1 * q[k]) / (h1 + h2);
   }
 }
 
@@ -420,6 +447,7 @@ static batten_status make_creases(batten_context *ctx, features *f, const unsign
   if (!t->bend) return BATTEN_E_NOMEM;
   for (size_t i = 0; i < 6 * t->edges; i++) t->bend[i] = 0;
   for (uint32_t v = 0; v < t->vertices; v++) judge_vertex(f, v);
+  refine_mates(f);
   continue_ends(f);
   for (uint32_t v = 0; v < t->vertices; v++) settle_corner(f, v);
   find_bends(f);
@@ -428,19 +456,15 @@ static batten_status make_creases(batten_context *ctx, features *f, const unsign
 
 /* ---- lines -------------------------------------------------------------------------------------- */
 
-/* Line edges meet in a vertex: one tangent for both, unless the line has a corner there, or a crease stands between
+/* Line edges meet in a vertex: they become mates, unless the line has a corner there, or a crease stands between
  * them or tells the direction already. */
 static void guide_line(features *f, uint32_t a, uint32_t b) {
   net_topology *t = f->t;
   double tangent[3];
-  double *guide[2] = {t->guide + 3 * (size_t)a, t->guide + 3 * (size_t)b};
-  if (vec_norm(guide[0]) > 0 || vec_norm(guide[1]) > 0) return;
+  if (vec_norm(t->guide + 3 * (size_t)a) > 0 || vec_norm(t->guide + 3 * (size_t)b) > 0) return;
   if (net_edge_node(t, a / 2, a % 2, 0) != net_edge_node(t, b / 2, b % 2, 0)) return;
   if (chord_turn(t, a, b) > f->corner_angle || !circle_tangent(t, a, b, tangent)) return;
-  for (int k = 0; k < 3; k++) {
-    guide[0][k] = -tangent[k];
-    guide[1][k] = tangent[k];
-  }
+  join_ends(f, a, b, tangent);
 }
 
 static batten_status check_lines(batten_context *ctx, const batten_network_options *opt) {
@@ -489,9 +513,11 @@ static batten_status make_line(batten_context *ctx, features *f, const uint32_t 
 static batten_status make_lines(batten_context *ctx, features *f, const batten_network_options *opt,
                                 const uint32_t *valence, unsigned char *is_line) {
   memset(is_line, 0, f->t->edges);
+  for (size_t i = 0; i < 2 * f->t->edges; i++) f->mate[i] = NET_NONE; /* those of creases are done with */
   batten_status st = BATTEN_OK;
   for (size_t i = 0; i < opt->line_count && st == BATTEN_OK; i++)
     st = make_line(ctx, f, valence, opt->line_vertices, opt->line_starts[i], opt->line_starts[i + 1], is_line);
+  if (st == BATTEN_OK) refine_mates(f);
   return st;
 }
 
@@ -523,6 +549,7 @@ batten_status net_features_make(batten_context *ctx, const batten_network_option
       !(f.open = batten_alloc_array(ctx, 2 * t->edges, sizeof *f.open)) ||
       !(f.ends = batten_alloc_array(ctx, (size_t)most + 1, sizeof *f.ends)) ||
       !(f.straight = batten_alloc_array(ctx, (size_t)most + 1, sizeof *f.straight)) ||
+      !(f.curvature = batten_alloc_array(ctx, t->edges, 6 * sizeof *f.curvature)) ||
       !(t->guide = batten_alloc_array(ctx, t->edges, 6 * sizeof *t->guide)))
     goto done;
   memcpy(f.first, t->node_first, t->vertices * sizeof *f.first);
@@ -535,6 +562,7 @@ batten_status net_features_make(batten_context *ctx, const batten_network_option
   if (st == BATTEN_OK) st = make_creases(ctx, &f, is_chosen);
   if (st == BATTEN_OK) st = make_lines(ctx, &f, opt, valence, is_chosen);
 done:
+  batten_free(ctx, f.curvature);
   batten_free(ctx, f.straight);
   batten_free(ctx, f.ends);
   batten_free(ctx, f.open);
