@@ -87,6 +87,18 @@ static batten_status write_cad(batten_context *ctx, const batten_network *networ
   return st;
 }
 
+static batten_status write_tessellated(batten_context *ctx, const batten_network *network,
+                                       const batten_write_network_options *o, const char *path) {
+  batten_tessellate_options t = batten_tessellate_options_default();
+  batten_mesh *mesh = NULL;
+  t.density = o->density;
+  t.tolerance = o->tolerance;
+  batten_status st = batten_network_tessellate(ctx, network, &t, &mesh);
+  if (st >= 0) st = batten_write_mesh(ctx, mesh, path);
+  batten_mesh_free(mesh);
+  return st;
+}
+
 batten_status batten_write_network(batten_context *ctx, const batten_network *network,
                                    const batten_write_network_options *opt, const char *path) {
   batten_write_network_options o = opt ? *opt : batten_write_network_options_default();
@@ -99,6 +111,12 @@ batten_status batten_write_network(batten_context *ctx, const batten_network *ne
     case BX_STEP:
     case BX_IGES:
       return write_cad(ctx, network, &o, format, path);
+    case BX_PLY:
+    case BX_OBJ:
+    case BX_OFF:
+    case BX_STL:
+    case BX_VTP:
+      return write_tessellated(ctx, network, &o, path);
     case BX_JSON:
     case BX_VTU:
       st = bx_create(&w, ctx, path);
