@@ -3,6 +3,7 @@
 #include "mesh/vec.h"
 #include "network/regular.h"
 #include "network/surface.h"
+#include "network_scenes.h"
 #include "network_shapes.h"
 #include "tap.h"
 
@@ -236,6 +237,38 @@ static void test_units(batten_context *ctx, batten_context *three) {
   for (int i = 0; i < 3; i++) shape_free(&s[i]);
 }
 
+/* Gauss and Bonnet hold where tangent planes agree, and fail where they do not: a second certificate for networks as
+ * they are built, that knows nothing of the edges. */
+static void test_built(batten_context *ctx) {
+  static const batten_network_fill fills[4] = {BATTEN_FILL_SS, BATTEN_FILL_DEGREE7, BATTEN_FILL_DEGREE6,
+                                               BATTEN_FILL_PN};
+  for (int which = 0; which < 2; which++) {
+    scene_mesh scene = which ? scene_mesh_genus3() : scene_mesh_octahedron_shifted(0.5, 0.3);
+    batten_mesh *mesh = NULL;
+    T_OK(batten_mesh_create(ctx, scene.vertices, scene.points, scene.triangles, scene.corners, &mesh), ctx);
+    for (int i = 0; i < 4; i++) {
+      batten_network_options opt = batten_network_options_default();
+      batten_network *n = NULL;
+      batten_network_info info;
+      batten_network_measures m;
+      opt.fill = fills[i];
+      batten_status st = batten_network_build(ctx, mesh, &opt, &n, &info);
+      T_CHECK(st == (i < 3 ? BATTEN_OK : BATTEN_W_ACCURACY), "fill %d of %zu facets: %s", (int)fills[i],
+              scene.triangles, batten_status_name(st));
+      if (st < 0) continue;
+      T_OK(batten_network_measure(ctx, n, &m), ctx);
+      double off_by = fabs(m.gauss_integral / (2 * SHAPE_PI) - (double)m.euler);
+      T_CHECK(m.euler == (which ? -4 : 2) && m.genus == (which ? 3 : 0) && m.irregular_patches == 0, "genus %ld",
+              m.genus);
+      if (i < 3) T_RATIO(off_by, 3e-6, "the integral of K is 2 pi euler");
+      if (i == 3) T_CHECK(off_by > 0.5, "but not on PN triangles: off by %.2g", off_by);
+      batten_network_free(n);
+    }
+    batten_mesh_free(mesh);
+    scene_mesh_free(&scene);
+  }
+}
+
 /* ---- regularity --------------------------------------------------------------------------------- */
 
 static void fold(const double xy[2], double out[3]) { /* along u = 0.6 */
@@ -363,6 +396,7 @@ int main(void) {
   test_torus(ctx);
   test_gauss_bonnet_with_boundary(ctx);
   test_units(ctx, three);
+  test_built(ctx);
   test_regularity(ctx);
   test_nothing_to_measure(ctx);
   shape s = shape_graph(2, 2, 3, cap);
