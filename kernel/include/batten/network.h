@@ -243,7 +243,9 @@ typedef struct batten_network_measures {
 BATTEN_API batten_status batten_network_measure(batten_context *ctx, const batten_network *network,
                                                 batten_network_measures *out);
 
-/* Joints by class of edge: of the mesh's edges the smooth ones and the creases, and the edges inside split facets. */
+/* Joints by class of edge: of the mesh's edges the smooth ones and the creases, and the edges inside split facets.
+ * What cannot be judged counts as the worst: a side without a normal 180 degrees and an infinite jump of curvature,
+ * one that is not finite an infinite gap. The 99 % quantile is rounded up, by 1.6 % at most. */
 typedef struct batten_joint_figures {
   size_t edges, samples;
   double gap_max, gap_rms;                               /* distance, caller's unit */
@@ -255,7 +257,8 @@ typedef struct batten_joint_figures {
 typedef struct batten_network_continuity {
   batten_joint_figures smooth, crease, inner;
   size_t boundary_edges;
-  double corner_gap_max; /* largest distance of a patch's corner from its vertex */
+  double corner_gap_max; /* largest distance of a patch's corner from its vertex; infinite when a control point is not
+                            finite */
 } batten_network_continuity;
 /* samples places on each edge, ends included, 2 .. 1000. Uses nothing but the patches and the mesh. Progress phase
  * "check". Fails: INVALID, NOMEM, CANCELLED. */
@@ -279,8 +282,9 @@ typedef struct batten_lines_options {
 } batten_lines_options;
 BATTEN_API batten_lines_options batten_lines_options_default(void);
 
-/* The quantity of which lines show the levels, in units of the distance of two lines, at every vertex of a mesh that
- * batten_network_tessellate made: values [its vertices]. */
+/* The quantity of which lines show the levels 1/2, 3/2, .. count - 1/2, in units of the distance of two lines, at every
+ * vertex of a mesh that batten_network_tessellate made: values [its vertices]; NaN without a normal. REFLECTION: it
+ * goes all around, and jumps by count somewhere; the lines below have no seam there. */
 BATTEN_API batten_status batten_network_line_values(batten_context *ctx, const batten_mesh *tessellation,
                                                     const batten_lines_options *opt, double *values);
 
