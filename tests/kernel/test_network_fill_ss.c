@@ -155,6 +155,9 @@ static void test_degenerate(void) {
           "the classic fill knows no factor");
 }
 
+static scene_mesh shifted(void) { return scene_mesh_octahedron_shifted(0.5, 0.3); }
+static scene_mesh sphere_42(void) { return scene_mesh_icosphere(2); }
+
 typedef struct scene {
   const char *name;
   scene_mesh (*make)(void);
@@ -196,6 +199,39 @@ static void test_joints(batten_context *ctx) {
       }
       free(p.net);
     }
+    check_net_free(ctx, &n);
+  }
+}
+
+/* What is known of the methods without optimised normals: how far PN triangles miss a common normal (from a
+ * prototype, on its meshes), and the range of K of the classic fill with D1 and L1. */
+static void test_rivals(batten_context *ctx) {
+  static const struct {
+    const char *name;
+    scene_mesh (*make)(void);
+    double jump, tolerance, K[2];
+  } rows[] = {{"octahedron", scene_mesh_octahedron, 46, 0.5, {.28, 2.52}},
+              {"shifted octahedron", shifted, 60, 0.5, {.19, 3.47}},
+              {"sphere of 42 vertices", sphere_42, 2.6, 0.05, {.87, 1.21}},
+              {"torus", scene_mesh_torus_10_6, 13, 0.5, {-3.2, 2.2}},
+              {"tetrahedron", scene_mesh_tetrahedron, 0, 180, {.068, 4.12}}};
+  batten_network_options o = check_options(0);
+  o.direction = BATTEN_DIRECTION_D1;
+  o.length = BATTEN_LENGTH_L1;
+  for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+    check_net n;
+    T_OK(check_net_make(ctx, rows[i].make(), &o, false, &n), ctx);
+    check_patches pn = check_patches_make(&n.t, 3, 1), ss = check_patches_make(&n.t, 4, 3);
+    fill_pn(&n, &pn);
+    fill_ss(&n, true, &ss);
+    check_figures a = check_measure(&pn, n.normals), b = check_measure(&ss, n.normals);
+    T_CHECK(
+        fabs(a.jump_max - rows[i].jump) <= rows[i].tolerance && a.corner_normal_deg <= 1e-11 && a.gap_max <= 1e-14,
+        "%s, PN triangles: normals differ by %.3g deg, K %.3f .. %.3f", rows[i].name, a.jump_max, a.K_min, a.K_max);
+    T_CHECK(b.jump_max <= 1e-11 && b.K_min >= rows[i].K[0] - 0.01 && b.K_max <= rows[i].K[1] + 0.01,
+            "%s, classic: normals differ by %.1e deg, K %.3f .. %.3f", rows[i].name, b.jump_max, b.K_min, b.K_max);
+    free(pn.net);
+    free(ss.net);
     check_net_free(ctx, &n);
   }
 }
@@ -270,6 +306,7 @@ int main(void) {
   test_degenerate();
   test_flat(ctx);
   test_joints(ctx);
+  test_rivals(ctx);
   test_random(ctx);
   test_time();
   batten_context_free(ctx);
