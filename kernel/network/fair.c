@@ -10,6 +10,8 @@
  *
  * A step is taken when the energy falls and no more facets are irregular than before. Otherwise damping grows:
  * around the facets that would turn irregular, or everywhere. So nothing that comes out is worse than the start.
+ * Facets that are next to singular, as rough scans have them from the start, count by the logarithm of their energy,
+ * and by as much in the equations: a few that cannot be mended do not hold up all others.
  *
  * The linear variant freezes normal, connection and metric of the last pass and the tangents' directions, so that the
  * map from unknowns to control points is affine and the rows are linear: a quadratic functional like the paper's, but
@@ -26,14 +28,19 @@ enum {
   LINEAR_PASSES = 2
 };
 
-static const double DAMPING_MIN = 1e-6, DAMPING_FIRST = 1e-3, DAMPING_FACTOR = 5;
+static const double DAMPING_MIN = 1e-6, DAMPING_FIRST = 1e-3, DAMPING_FACTOR = 5, DAMPING_FALL = 25;
 /* Added around facets that would turn irregular: shortens their step to a few parts in a hundred in four trials. */
-static const double GUARD_FIRST = 0.1, GUARD_FACTOR = 5;
-/* A facet counts as irregular when k, or the area of the parameters, turned to the corners' normals, falls below this
- * part of its mean. */
+static const double GUARD_FIRST = 0.3, GUARD_FACTOR = 10;
+/* A facet counts as irregular where the degree 7 fill would refuse it, and when the area of the parameters, turned to
+ * the corners' normals, falls below this part of its mean. */
 static const double REGULAR_MIN = 0.02;
 /* Residuals' rounding in parts of 1 / edge^3 with coordinates of about 1: below it a mesh is flat. */
 static const double ROUNDING = 1e-12;
+/* A facet's energy counts in full up to this over its area: a hundred times that of the hardest bends. Above, where
+ * its patch is next to singular, only the logarithm does, so that it does not outweigh all others. */
+static const double SINGULAR = 1e3;
+static const double LITTLE = 1e-3;      /* part of the energy that ties may cost where all is done */
+static const double ENERGY_MAX = 1e200; /* for what is not finite */
 /* Of the integral of |II|^4: a sphere whose curvature is off by some parts in a thousand has as much energy. */
 static const double VISIBLE = 1e-4;
 
@@ -43,7 +50,7 @@ typedef struct fair_state {
   double (*inner)[3][3];    /* [faces] displacements */
   double *energy;           /* [faces] */
   unsigned char *irregular; /* [faces] */
-  double total;
+  double counted;           /* sum of energies as they count */
   size_t irregular_count;
 } fair_state;
 
@@ -58,6 +65,7 @@ typedef struct fair_job {
   fair_equations *equations; /* [faces] */
   double *reduced;           /* [faces][FAIR_REDUCED] */
   fair_freedom *freedom;     /* [nodes] */
+  double *cap;               /* [faces] energies that count in full */
   double *guard;             /* [nodes] damping beside that of all */
   double damping;
   block_matrix matrix;
@@ -95,6 +103,9 @@ static void run(fair_job *job, size_t items, fair_body *body) {
 
 /* ---- a state's energy ------------------------------------------------------------------------------------- */
 
+/* What a facet's energy counts, and by its derivative its equations do. */
+static double counted(double energy, double cap) { return energy <= cap ? energy : cap * (1 + log(energy / cap)); }
+
 static void gather(const fair_job *job, const fair_state *state, size_t face, fair_facet *out) {
   net_facet_ribbons(job->t, state->nodes, state->local, face, out->corner, out->ribbon);
   memcpy(out->inner, state->inner[face], sizeof out->inner);
@@ -109,7 +120,8 @@ static void measure_face(fair_job *job, fair_scratch *scratch, size_t face) {
   fair_state *s = &job->next;
   fair_facet facet;
   gather(job, s, face, &facet);
-  bool regular = fair_facet_net(&facet, scratch->net) > REGULAR_MIN;
+  bool regular = net_fill_degree7(facet.corner, facet.ribbon, scratch->points);
+  fair_facet_net(&facet, scratch->net);
   double up[3], energy = 0, least = INFINITY, mean = 0;
   for (int x = 0; x < 3; x++) up[x] = facet.corner[0].w[x] + facet.corner[1].w[x] + facet.corner[2].w[x];
   vec_normalize(up);
@@ -121,8 +133,8 @@ static void measure_face(fair_job *job, fair_scratch *scratch, size_t face) {
     least = fmin(least, upward);
     mean += upward / FAIR_POINTS;
   }
-  s->energy[face] = isfinite(energy) ? energy : INFINITY;
-  s->irregular[face] = !(regular && isfinite(energy) && least > REGULAR_MIN * fabs(mean));
+  s->energy[face] = energy <= ENERGY_MAX ? energy : ENERGY_MAX;
+  s->irregular[face] = !(regular && energy <= ENERGY_MAX && least > REGULAR_MIN * fabs(mean));
 }
 
 /* Of job->next, from its nodes and displacements. */
@@ -130,10 +142,10 @@ static void measure(fair_job *job) {
   fair_state *s = &job->next;
   run(job, job->t->edges, make_tangents);
   run(job, job->t->faces, measure_face);
-  s->total = 0;
+  s->counted = 0;
   s->irregular_count = 0;
   for (size_t f = 0; f < job->t->faces; f++) {
-    s->total += s->energy[f];
+    s->counted += counted(s->energy[f], job->cap[f]);
     s->irregular_count += s->irregular[f];
   }
 }
@@ -144,16 +156,20 @@ static void swap_states(fair_job *job) {
   job->next = before;
 }
 
+static double double_area(const net_topology *t, size_t face) {
+  const uint32_t *v = t->triangles + 3 * face;
+  double n[3];
+  vec_triangle_normal(t->points + 3 * (size_t)v[0], t->points + 3 * (size_t)v[1], t->points + 3 * (size_t)v[2], n);
+  return vec_norm(n);
+}
+
 /* Two energies to compare with: what rounding alone gives, and the integral of |II|^4, of the same dimension, which
  * says how much of |grad II|^2 the eye could see. */
 static void energy_scales(const fair_job *job, double *rounding, double *visible) {
   const net_topology *t = job->t;
   *rounding = *visible = 0;
   for (size_t f = 0; f < t->faces; f++) {
-    const uint32_t *v = t->triangles + 3 * f;
-    double n[3];
-    vec_triangle_normal(t->points + 3 * (size_t)v[0], t->points + 3 * (size_t)v[1], t->points + 3 * (size_t)v[2], n);
-    double area = vec_norm(n), r = ROUNDING / (area * sqrt(area));
+    double area = double_area(t, f), r = ROUNDING / (area * sqrt(area));
     *rounding += area * r * r;
     for (unsigned k = 0; k < 3; k++) {
       const double *x = job->now.nodes[t->node[3 * f + k]].x;
@@ -174,7 +190,10 @@ static void make_equations(fair_job *job, fair_scratch *scratch, size_t face) {
   fair_facet_axes(job->tables, (const double(*)[FAIR_NET])scratch->net, to->axes);
   fair_facet_slopes(job->t, &job->opt, job->now.local, face, &facet, job->model == FAIR_LINEAR, scratch->slopes);
   fair_equations_make(job->tables, job->model, (const double(*)[3])facet.inner, scratch, to);
-  if (batten_first_nonfinite(FAIR_PACKED, to->products) < FAIR_PACKED) memset(to->products, 0, sizeof to->products);
+  double weight = fmin(1, job->cap[face] / job->now.energy[face]);
+  bool finite = batten_first_nonfinite(FAIR_PACKED, to->products) == FAIR_PACKED;
+  for (size_t i = 0; i < FAIR_PACKED && weight < 1; i++) to->products[i] *= weight;
+  if (!finite) memset(to->products, 0, sizeof to->products);
 }
 
 static void make_freedom(fair_job *job, fair_scratch *scratch, size_t node) {
@@ -252,9 +271,9 @@ static void raise_guard(fair_job *job) {
   }
 }
 
-/* Energy with that of the ties, as they are in this pass. */
+/* What the steps make smaller: energies as they count, with those of the ties as they are in this pass. */
 static double merit(const fair_job *job, const fair_state *s) {
-  double sum = s->total;
+  double sum = s->counted;
   for (size_t f = 0; f < job->t->faces; f++)
     sum += fair_equations_ties(&job->equations[f], (const double(*)[3])s->inner[f]);
   return sum;
@@ -262,19 +281,23 @@ static double merit(const fair_job *job, const fair_state *s) {
 
 /* One pass: *lower tells whether any step could lower the energy. */
 static batten_status pass(fair_job *job, bool *lower) {
+  bool grown = false;
   *lower = false;
   run(job, job->t->nodes, make_freedom);
   run(job, job->t->faces, make_equations);
-  memset(job->guard, 0, job->t->nodes * sizeof *job->guard);
+  for (size_t i = 0; i < job->t->nodes; i++) job->guard[i] = job->guard[i] > GUARD_FIRST ? job->guard[i] / 100 : 0;
   for (unsigned trial = 0; trial < TRIALS_MAX; trial++) {
     batten_status st = try_step(job);
     if (st < 0 && st != BATTEN_E_SINGULAR) return st;
     bool falls = st >= 0 && merit(job, &job->next) < merit(job, &job->now);
-    if (falls && !(job->next.total < job->now.total)) break; /* only the ties gain: there is nothing left */
+    if (falls && job->next.counted >= job->now.counted) { /* only the ties gain */
+      if (job->next.counted < (1 + LITTLE) * job->now.counted) break;
+      falls = false;
+    }
     *lower = falls && job->next.irregular_count <= job->now.irregular_count;
     if (*lower) {
       swap_states(job);
-      job->damping = fmax(DAMPING_MIN, job->damping / (DAMPING_FACTOR * DAMPING_FACTOR));
+      job->damping = fmax(DAMPING_MIN, job->damping / (grown ? DAMPING_FACTOR : DAMPING_FALL));
       break;
     }
     if (!falls && job->model == FAIR_FROZEN) { /* no matter how short, its step may not be one down */
@@ -282,6 +305,7 @@ static batten_status pass(fair_job *job, bool *lower) {
       run(job, job->t->faces, make_equations);
     } else if (!falls) {
       job->damping = fmax(DAMPING_FIRST, DAMPING_FACTOR * job->damping);
+      grown = true;
     } else {
       raise_guard(job);
     }
@@ -336,9 +360,11 @@ static batten_status job_make(fair_job *job) {
   if (job->scratch) job->equations = batten_alloc_array(job->ctx, t->faces, sizeof *job->equations);
   if (job->equations) job->reduced = batten_alloc_array(job->ctx, t->faces, FAIR_REDUCED * sizeof *job->reduced);
   if (job->reduced) job->freedom = batten_alloc_array(job->ctx, t->nodes, sizeof *job->freedom);
-  if (job->freedom) job->guard = batten_alloc_array(job->ctx, t->nodes, sizeof *job->guard);
+  if (job->freedom) job->cap = batten_alloc_array(job->ctx, t->faces, sizeof *job->cap);
+  if (job->cap) job->guard = batten_alloc_array(job->ctx, t->nodes, sizeof *job->guard);
   if (job->guard) job->step = batten_alloc_array(job->ctx, t->nodes, 5 * sizeof *job->step);
   if (!job->step) return BATTEN_E_NOMEM;
+  memset(job->guard, 0, t->nodes * sizeof *job->guard);
   fair_tables_make(job->tables);
   return system_make(job);
 }
@@ -348,6 +374,7 @@ static void job_free(fair_job *job) {
   block_matrix_free(job->ctx, &job->matrix);
   batten_free(job->ctx, job->step);
   batten_free(job->ctx, job->guard);
+  batten_free(job->ctx, job->cap);
   batten_free(job->ctx, job->freedom);
   batten_free(job->ctx, job->reduced);
   batten_free(job->ctx, job->equations);
@@ -364,6 +391,7 @@ static void begin(fair_job *job, const net_node *nodes) {
     fair_node_constrain(job->t->constraint ? &job->t->constraint[i] : NULL, &job->next.nodes[i]);
   }
   memset(job->next.inner, 0, job->t->faces * sizeof *job->next.inner);
+  for (size_t f = 0; f < job->t->faces; f++) job->cap[f] = SINGULAR / double_area(job->t, f);
   measure(job);
   swap_states(job);
 }
@@ -371,16 +399,16 @@ static void begin(fair_job *job, const net_node *nodes) {
 static batten_status iterate(fair_job *job, double fair_tol, unsigned passes, unsigned *done) {
   batten_status st = batten_progress(job->ctx, "fair", 0);
   for (*done = 0; st >= 0 && *done < passes;) {
-    double rounding, visible, before = job->now.total, damping = job->damping;
+    double rounding, visible, before = job->now.counted, damping = job->damping;
     bool lower;
     energy_scales(job, &rounding, &visible);
-    if (job->now.total <= rounding) break;
+    if (job->now.counted <= rounding) break;
     st = pass(job, &lower);
     if (st < 0 || !lower) break;
     ++*done;
     st = batten_progress(job->ctx, "fair", (double)*done / passes);
     bool damped = job->damping > DAMPING_MIN && job->damping >= damping; /* a short step need not be the last */
-    if (!damped && before - job->now.total < fair_tol * (before + visible)) break;
+    if (!damped && before - job->now.counted < fair_tol * (before + visible)) break;
   }
   return st;
 }
@@ -398,7 +426,7 @@ static void finish(fair_job *job, net_node *nodes, double start, unsigned passes
   memcpy(nodes, job->now.nodes, job->t->nodes * sizeof *nodes);
   figures->fairing_passes = passes;
   figures->energy_start = start;
-  figures->energy = job->now.total;
+  figures->energy = job->now.counted;
   figures->unknowns = 9 * job->t->faces;
   for (size_t i = 0; i < job->t->nodes; i++) figures->unknowns += job->freedom[i].dof;
 }
@@ -415,7 +443,7 @@ batten_status net_fair(batten_context *ctx, const net_topology *t, const batten_
   if (st < 0) goto done;
   begin(&job, nodes);
   run(&job, t->nodes, make_freedom);
-  double start = job.now.total;
+  double start = job.now.counted;
   st = iterate(&job, opt->fair_tol, linear ? LINEAR_PASSES : opt->fair_passes, &passes);
   if (st >= 0) finish(&job, nodes, start, passes, figures);
 done:

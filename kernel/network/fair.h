@@ -65,9 +65,8 @@ typedef struct fair_facet {
   double inner[3][3]; /* displacements of the inner control points from those of least thin plate energy */
 } fair_facet;
 
-/* The facet's net. Returns the least coefficient of k (see net_across) over the mean: positive is regular as far as
- * the edges go. */
-double fair_facet_net(const fair_facet *facet, fair_net net);
+/* The facet's net. */
+void fair_facet_net(const fair_facet *facet, fair_net net);
 
 /* Derivatives of the net by p, q, r, m, n of the three corners, columns 5 * corner + which; the last lane is 0.
  * Normals turn their frames, and the curves follow the normals; linear: frames and tangents stand still. */
@@ -102,6 +101,7 @@ typedef struct fair_equations {
 typedef struct fair_scratch {
   fair_slopes slopes;
   fair_net net, rows[FAIR_ROWS];
+  double points[FAIR_NET][3];
   double columns[FAIR_ROWS][FAIR_UNKNOWNS + 2], products[FAIR_UNKNOWNS + 1][FAIR_UNKNOWNS + 2];
 } fair_scratch;
 

@@ -17,20 +17,13 @@ static void planes(const double (*points)[3], fair_net net) {
     for (unsigned x = 0; x < 3; x++) net[x][p] = points[p][x];
 }
 
-double fair_facet_net(const fair_facet *facet, fair_net net) {
-  double points[FAIR_NET][3], least = INFINITY, mean = 0;
-  net_across across[3];
-  net_degree7_frame(facet->corner, facet->ribbon, points, across);
+void fair_facet_net(const fair_facet *facet, fair_net net) {
+  double points[FAIR_NET][3];
+  net_degree7_frame(facet->corner, facet->ribbon, points, NULL);
   net_degree7_interior(points);
-  for (unsigned i = 0; i < 3; i++) {
+  for (unsigned i = 0; i < 3; i++)
     for (unsigned x = 0; x < 3; x++) points[NET_DEGREE7_INTERIOR[i]][x] += facet->inner[i][x];
-    for (unsigned k = 0; k < 4; k++) {
-      if (!(across[i].k[k] >= least)) least = across[i].k[k]; /* a NaN stays */
-      mean += fabs(across[i].k[k]) / 12;
-    }
-  }
   planes((const double(*)[3])points, net);
-  return least / mean;
 }
 
 void fair_facet_axes(const fair_tables *tables, const fair_net net, double (*axes)[3][3]) {
