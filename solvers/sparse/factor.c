@@ -175,6 +175,83 @@ static void run_tiles(batten_context *ctx, size_t count, void (*tile)(void *arg,
   for (size_t i = 0; i < count; i++) tile(d, i);
 }
 
+/* to -= sum of f[c] columns[c] over four columns. */
+static void subtract_four(size_t count, const double f[4], const double *restrict columns, size_t ld,
+                          double *restrict to) {
+  const double *restrict a = columns, *restrict b = a + ld, *restrict c = b + ld, *restrict d = c + ld;
+  for (size_t i = 0; i < count; i++) to[i] -= (f[0] * a[i] + f[1] * b[i]) + (f[2] * c[i] + f[3] * d[i]);
+}
+
+static void subtract_one(size_t count, double f, const double *restrict column, double *restrict to) {
+  for (size_t i = 0; i < count; i++) to[i] -= f * column[i];
+}
+
+/* to [count] -= what columns from .. end - 1 of the panel, at this row and below, take off of the column that belongs
+ * to the row. */
+static void subtract_columns(const dense_front *d, size_t row, size_t from, size_t end, double *to) {
+  size_t ld = d->height, count = ld - row;
+  for (; from + 4 <= end; from += 4) {
+    const double *l = d->panel + from * ld + row, f[4] = {l[0], l[ld], l[2 * ld], l[3 * ld]};
+    subtract_four(count, f, l, ld, to);
+  }
+  for (; from < end; from++) subtract_one(count, d->panel[from * ld + row], d->panel + from * ld + row, to);
+}
+
+/* Columns from .. to - 1 of the panel, which lack what they take off of each other; 0, or the 1-based row of the
+ * pivot that is not positive. */
+static size_t factor_columns(const dense_front *d) {
+  for (size_t j = d->from; j < d->to; j++) {
+    double *column = d->panel + j * (d->height + 1);
+    subtract_columns(d, j, d->from, j, column);
+    if (!(column[0] > 0) || !isfinite(column[0])) return j + 1;
+    column[0] = sqrt(column[0]);
+    double inverse = 1 / column[0];
+    for (size_t i = 1; i < d->height - j; i++) column[i] *= inverse;
+  }
+  return 0;
+}
+
+/* A small front, panel and update, by loops of our own: a call of BLAS costs more than a small front, far more where
+ * BLAS wakes its threads for it. */
+static size_t factor_small(dense_front *d) {
+  d->from = 0;
+  d->to = d->own;
+  size_t bad = factor_columns(d);
+  if (bad) return bad;
+  for (size_t j = 0; j < d->below; j++) {
+    double *column = d->update + j * (d->below + 1);
+    memset(column, 0, (d->below - j) * sizeof *column);
+    subtract_columns(d, d->own + j, 0, d->own, column);
+  }
+  return 0;
+}
+
+/* Rows and columns of the front from `row` to `end` - 1, less what the step takes off; the diagonal tiles whole, what
+ * is above the diagonal is never read. `to`: where (row, row) is. */
+static void subtract_tiles(const dense_front *d, size_t row, size_t end, double beta, double *to, size_t ld) {
+  enum { ROWS = 128, COLUMNS = 64 };
+  const double *l = d->panel + d->from * d->height;
+  size_t wide = d->to - d->from;
+  for (size_t column = row; column < end; column += COLUMNS)
+    for (size_t i = column; i < d->height; i += ROWS)
+      batten_la_gemm(BATTEN_LA_DOUBLE, 'N', 'T', least(ROWS, d->height - i), least(COLUMNS, end - column), wide, -1,
+                     l + i, d->height, l + column, d->height, beta, to + (column - row) * ld + (i - row), ld);
+}
+
+/* Fronts of middle size: narrow steps by loops of our own, the rest by products so small (128 x 64 x 32) that BLAS
+ * does not wake its threads, which costs more than they save and keeps the other tasks waiting. */
+static size_t factor_middle(dense_front *d) {
+  enum { STEP = 32 };
+  for (d->from = 0; d->from < d->own; d->from = d->to) {
+    d->to = least(d->own, d->from + STEP);
+    size_t bad = factor_columns(d);
+    if (bad) return bad;
+    subtract_tiles(d, d->to, d->own, 1, d->panel + d->to * (d->height + 1), d->height);
+    subtract_tiles(d, d->own, d->height, d->from == 0 ? 0 : 1, d->update, d->below);
+  }
+  return 0;
+}
+
 /* Factor of the panel and the update that it leaves. 0, or the 1-based row of the pivot that is not positive. ctx
  * NULL: on this thread. */
 static size_t factor_dense(batten_context *ctx, dense_front *d) {
@@ -247,7 +324,7 @@ static void add_children(const factoring *k, size_t s, bool to_panel, double *to
 }
 
 static size_t factor_front(batten_context *ctx, const factoring *k, size_t s) {
-  const double PARALLEL_FLOPS = 1e7; /* a millisecond */
+  const double SMALL_FLOPS = 6e4, PARALLEL_FLOPS = 1e7; /* 20 us, a millisecond */
   const block_fronts *f = k->f;
   const block_work *w = k->w;
   size_t own = block_front_own(f, s) * f->size, below = block_front_below(f, s) * f->size, height = own + below;
@@ -256,8 +333,10 @@ static size_t factor_front(batten_context *ctx, const factoring *k, size_t s) {
   BLOCK_FOR_SIZE(f->size, scatter, f, s, k->a->values, w->factor);
   add_children(k, s, true, panel, height);
   dense_front d = {.panel = panel, .update = update, .height = height, .own = own, .below = below};
-  bool large = block_front_flops((double)own, (double)below) > PARALLEL_FLOPS;
-  size_t bad = factor_dense(large ? ctx : NULL, &d);
+  double flops = block_front_flops((double)own, (double)below);
+  size_t bad = flops < SMALL_FLOPS      ? factor_small(&d)
+               : flops < PARALLEL_FLOPS ? factor_middle(&d)
+                                        : factor_dense(ctx, &d);
   if (bad) return 1 + f->order[f->first[s] + (bad - 1) / f->size];
   add_children(k, s, false, update, below);
   if (w->update[s] != w->scratch[s]) memmove(w->updates + w->update[s], update, below * below * sizeof *update);

@@ -1,6 +1,6 @@
 /* The order of unknowns that gives the narrowest band: reverse Cuthill-McKee from pseudo-peripheral nodes [George,
  * Liu, Computer Solution of Large Sparse Positive Definite Systems, 1981, ch. 4]. The order for least fill is in
- * order_degree.c, that by dissection in dissect.c. */
+ * order_degree.c, that by dissection in order_dissect.c. */
 #include <stdlib.h>
 #include <string.h>
 
