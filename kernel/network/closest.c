@@ -61,6 +61,9 @@ typedef struct search {
   part *parts;
 } search;
 
+/* What the distance may miss: rounding of it too. */
+static double may_miss(const search *s) { return s->job->miss + 8 * DBL_EPSILON * s->best; }
+
 /* ---- the minimum on a part ---------------------------------------------------------------------- */
 
 typedef struct slope {
@@ -162,7 +165,7 @@ static bool nothing_to_gain(const search *s, const double (*net)[3], const doubl
       fmax(pow(vec_distance(net[0], net[n]), 2), pow(vec_distance(net[0], net[triangular_count(n) - 1]), 2));
   /* Places are rounded, which turns a gradient of 0 into 1e-16 size^2; a gain of that kind is its square. */
   double distance = sqrt(2 * a.value);
-  return distance <= s->job->miss || gain + below <= distance * s->job->miss + 1e-13 * size2;
+  return distance <= may_miss(s) || gain + below <= distance * may_miss(s) + 1e-13 * size2;
 }
 
 /* f is convex on the part, or so nearly that |S|^2 / 2 is at most `below` under its tangent plane. False when the
@@ -289,10 +292,10 @@ static void search_patch(search *s, uint32_t patch) {
     double least = square_net(s->job->weights, n, net, s->square);
     for (int c = 0; c < 3; c++) take(s, &p, corners[c]);
     /* (best - miss)^2 and more is of no use. */
-    double enough = fmax(0, s->best - s->job->miss);
-    if (least >= enough * enough || s->best <= s->job->miss) continue;
+    double enough = fmax(0, s->best - may_miss(s));
+    if (least >= enough * enough || s->best <= may_miss(s)) continue;
     double below = concavity(2 * n, s->square);
-    if (below <= s->best * s->job->miss && minimise(s, &p, net, 0.5 * below)) continue;
+    if (below <= s->best * may_miss(s) && minimise(s, &p, net, 0.5 * below)) continue;
     if (p.depth == DEPTH) continue;
     memcpy(s->scratch, top, 3 * count * sizeof *top);
     split_part(n, &p, (const double(*)[3])s->scratch, top, parts + height, s->scratch + 3 * count);

@@ -233,6 +233,38 @@ static void test_focal_points(batten_context *ctx) {
   shape_free(&s);
 }
 
+/* From afar the rounding of the distance is more than a millionth part of the surface. */
+static void test_far_points(batten_context *ctx) {
+  shape s = shape_torus(4);
+  batten_network *n = network_of(ctx, &s);
+  double start = batten_now(), worst = 0;
+  size_t turned = 0;
+  for (int e = 2; e < 14; e += 2) {
+    uint64_t seed = 5;
+    double points[30][3], distances[30], size = pow(10, e);
+    batten_place places[30];
+    batten_surface_point p[30];
+    for (size_t i = 0; i < 30; i++)
+      for (int d = 0; d < 3; d++) points[i][d] = size * (2 * t_uniform(&seed) - 1);
+    if (batten_network_closest(ctx, n, 30, points[0], places, distances) < 0 ||
+        batten_network_evaluate(ctx, n, 30, places, p) < 0)
+      worst = INFINITY;
+    for (size_t i = 0; i < 30; i++) {
+      double way[3];
+      vec_sub(points[i], p[i].point, way);
+      worst = worse(worst, fabs(distances[i] - vec_norm(way)) / distances[i]);
+      vec_normalize(way);
+      /* Feet are known to the square root of what the distance is known to. */
+      if (!(vec_dot(way, p[i].normal) > (e < 7 ? 1 - 1e-6 : 0.99))) turned++;
+    }
+  }
+  T_RATIO(worst, 4e-15, "from 1e2 to 1e12 away: the places are at the distances");
+  T_CHECK(turned == 0, "and their normals point there, but for %zu", turned);
+  printf("# %.0f us a point\n", 1e6 * (batten_now() - start) / 180);
+  batten_network_free(n);
+  shape_free(&s);
+}
+
 static void test_units(batten_context *ctx, batten_context *three) {
   shape s = shape_torus(4), large = shape_torus(4), turned = shape_torus(4);
   shape_move(&large, false, 0x1p80, (double[3]){0, 0, 0});
@@ -359,6 +391,7 @@ int main(void) {
   against_brute_force(ctx, &s, "a torus", 3, 40);
   test_feet(ctx);
   test_focal_points(ctx);
+  test_far_points(ctx);
   test_units(ctx, three);
   test_bad(ctx);
   batten_context_free(three);
