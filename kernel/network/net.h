@@ -11,7 +11,8 @@
  *   fill_*.c     one facet each: raw arrays in, control points out
  *   fair.c       the fair fill and its linear variant; fair_*.c
  *   surface.c    the handle; evaluate.c, tessellate.c, closest.c, measure.c, continuity.c, lines.c: know nothing of
- * all above but the handle
+ *                all above but the handle. For them: shape.c, normal and curvatures from derivatives; regular.c,
+ *                proofs that a normal vanishes nowhere; patch_tree.c and box.c, boxes of patches and of the whole
  *
  * Below network.c coordinates are scaled by a power of two, and shifted, so that the mesh's size is about 1:
  * constants may say so. Numerics take raw arrays and run on worker threads: no allocation, no context.
