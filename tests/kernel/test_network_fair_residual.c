@@ -162,7 +162,7 @@ static void rows_by_differences(void) {
     random_net(&seed, 0.01, net);
     for (unsigned x = 0; x < 3; x++)
       for (unsigned p = 0; p < 36; p++) way[x][p] = 2 * t_uniform(&seed) - 1;
-    double before[64], after[64], h = 1e-6, slope = 0, squares = 0, change = 0, energies[2];
+    double before[64], after[64], h = 1e-6, slope = 0, change = 0, energies[2];
     for (int side = 0; side < 2; side++) {
       for (unsigned x = 0; x < 3; x++)
         for (unsigned p = 0; p < 36; p++) moved[x][p] = net[x][p] + (side ? h : -h) * way[x][p];
@@ -176,8 +176,6 @@ static void rows_by_differences(void) {
         for (unsigned x = 0; x < 3; x++)
           for (unsigned p = 0; p < 36; p++) along += rows[a][x][p] * way[x][p];
         slope += along * r[a];
-        /* the frame's spin is left out: the length of all four rows is what counts, by points */
-        squares += r[a] * r[a];
         change += difference * r[a];
       }
       fair_residual(tables, (const double(*)[36])net, g, FAIR_LINEAR, r, rows, NULL);
