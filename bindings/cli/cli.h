@@ -17,6 +17,7 @@ enum { CLI_DONE = 0, CLI_FAILED = 1, CLI_USAGE = 2, CLI_INTERRUPTED = 130 };
 /* ---- subcommands: argv[0] is the subcommand's name ---- */
 int cli_solid(int argc, char **argv);
 int cli_qp(int argc, char **argv);
+int cli_network(int argc, char **argv);
 int cli_inspect(int argc, char **argv);
 
 /* ---- options.c: one table gives the parser and the help ---- */
@@ -90,9 +91,11 @@ void cli_run_warn(cli_run *run, batten_status status);
 /* ---- outputs.c: files that appear together, or not at all ---- */
 typedef enum cli_output_kind {
   CLI_OUTPUT_SURFACE,
-  CLI_OUTPUT_PICTURE,
+  CLI_OUTPUT_PICTURE, /* of solids in space or in the plane */
+  CLI_OUTPUT_SHADED,  /* of surfaces */
   CLI_OUTPUT_REPORT,
   CLI_OUTPUT_SOLID,
+  CLI_OUTPUT_NETWORK,
   CLI_OUTPUT_QP,
   CLI_OUTPUT_QP_SOLUTION
 } cli_output_kind;
@@ -134,16 +137,38 @@ typedef struct cli_request {
 } cli_request;
 
 /* Keys of the options that commands share, and their rows; a command's own keys follow CLI_KEY_OWN. */
-enum { CLI_KEY_REPORT = CHAR_MAX + 1, CLI_KEY_MEMORY, CLI_KEY_THREADS, CLI_KEY_OWN };
-#define CLI_OPTION_REPORT                                                                                  \
-  {"report", CLI_KEY_REPORT, "FILE",                                                                       \
-   "figures as a flat JSON object (keys: docs/report.md); - prints them in\nplace of the summary"}
+enum {
+  CLI_KEY_REPORT = CHAR_MAX + 1,
+  CLI_KEY_MEMORY,
+  CLI_KEY_THREADS,
+  CLI_KEY_VIEW,
+  CLI_KEY_UP,
+  CLI_KEY_SIZE,
+  CLI_KEY_TITLE,
+  CLI_KEY_OWN
+};
+#define CLI_OPTION_REPORT                                                                              \
+  {                                                                                                    \
+    "report", CLI_KEY_REPORT, "FILE",                                                                  \
+        "figures as a flat JSON object (keys: docs/report.md); - prints them in\nplace of the summary" \
+  }
 #define CLI_OPTION_MEMORY \
-  {"memory", CLI_KEY_MEMORY, "SIZE", "use at most so much, for instance 2G; default 90 % of what the machine has"}
+  { "memory", CLI_KEY_MEMORY, "SIZE", "use at most so much, for instance 2G; default 90 % of what the machine has" }
 #define CLI_OPTION_THREADS \
-  {"threads", CLI_KEY_THREADS, "N", "threads; default all cores (BLAS has its own: OPENBLAS_NUM_THREADS)"}
-#define CLI_OPTION_QUIET {"quiet", 'q', NULL, "no summary, no progress"}
-#define CLI_OPTION_HELP {"help", 'h', NULL, "this text"}
+  { "threads", CLI_KEY_THREADS, "N", "threads; default all cores (BLAS has its own: OPENBLAS_NUM_THREADS)" }
+#define CLI_OPTION_QUIET \
+  { "quiet", 'q', NULL, "no summary, no progress" }
+/* Of commands that draw; cli_take_picture takes them. */
+#define CLI_OPTION_VIEW \
+  { "view", CLI_KEY_VIEW, "AZ,EL", "direction of the picture's camera, degrees; default 35,22" }
+#define CLI_OPTION_UP \
+  { "up", CLI_KEY_UP, "AXIS", "x, y or z points upwards in the picture; default z" }
+#define CLI_OPTION_SIZE \
+  { "size", CLI_KEY_SIZE, "W,H", "picture's size in pixels; default 1200,900" }
+#define CLI_OPTION_TITLE \
+  { "title", CLI_KEY_TITLE, "TEXT", "title in the picture" }
+#define CLI_OPTION_HELP \
+  { "help", 'h', NULL, "this text" }
 
 typedef struct cli_command {
   const char *name, *operand; /* "qp", "problem" */
@@ -152,6 +177,9 @@ typedef struct cli_command {
   bool (*take)(cli_request *q, int key, const char *value); /* own options; false after a line on stderr */
   int (*work)(cli_request *q);                              /* returns the exit status */
 } cli_command;
+
+/* One of the options of pictures into p; false after a line on stderr. */
+bool cli_take_picture(batten_picture_options *p, int key, const char *value);
 
 /* Parses, then prints the help or checks the outputs and works. Returns the exit status. */
 int cli_command_run(const cli_command *c, cli_request *q, int argc, char **argv);

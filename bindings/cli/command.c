@@ -1,6 +1,7 @@
 /* What every subcommand does around its work: parse, help, check of the outputs. */
 #include "cli.h"
 
+#include <math.h>
 #include <stdint.h>
 
 /* The options that all commands have; the rest is the command's own. */
@@ -23,6 +24,39 @@ static bool take(const cli_command *c, cli_request *q, int key, const char *valu
       return true;
     default:
       return c->take(q, key, value);
+  }
+}
+
+bool cli_take_picture(batten_picture_options *p, int key, const char *value) {
+  static const char *const axes[] = {"x", "y", "z", NULL};
+  double pair[2] = {0};
+  int word = 0;
+  switch (key) {
+    case CLI_KEY_VIEW:
+      if (!cli_parse_numbers("--view", value, 2, pair)) return false;
+      if (fabs(pair[1]) > 90) {
+        cli_error("--view: elevation %g is not from -90 to 90", pair[1]);
+        return false;
+      }
+      p->azimuth_deg = pair[0];
+      p->elevation_deg = pair[1];
+      return true;
+    case CLI_KEY_UP:
+      if (!cli_parse_word("--up", value, axes, &word)) return false;
+      p->up_axis = (unsigned)word;
+      return true;
+    case CLI_KEY_SIZE:
+      if (!cli_parse_numbers("--size", value, 2, pair)) return false;
+      if (!(pair[0] >= 16 && pair[0] <= 8192 && pair[1] >= 16 && pair[1] <= 8192)) {
+        cli_error("--size: '%s' is not two numbers of pixels from 16 to 8192", value);
+        return false;
+      }
+      p->width = (unsigned)pair[0];
+      p->height = (unsigned)pair[1];
+      return true;
+    default:
+      p->title = value;
+      return true;
   }
 }
 

@@ -1,5 +1,6 @@
 /* batten inspect: what is in a file, and its measures. */
 #include "cli.h"
+#include "network.h"
 #include "qp.h"
 
 #include <limits.h>
@@ -17,7 +18,9 @@ static void print_help(void) {
       "usage: batten inspect FILE [OPTIONS]\n\n"
       "Tells what is in a file: points, a mesh (its measures, whether it is closed and manifold, triangles that "
       "cross),\n"
-      "a solid or a carrier saved by batten, a quadratic program (its sizes, which engine would solve it).\n\n");
+      "a network of Bezier triangles (continuity across its edges, curvature), a solid or a carrier saved by batten, "
+      "a\n"
+      "quadratic program (its sizes, which engine would solve it).\n\n");
   cli_options_print(table);
   printf("\nexample:\n\n  batten inspect mesh.ply --report mesh.json\n");
 }
@@ -78,6 +81,32 @@ static batten_status tell_mesh(cli_run *run, const char *path, bool print, cli_r
     tell_box(r, false, 3, m.lower, m.upper);
   }
   batten_mesh_free(mesh);
+  return st;
+}
+
+static batten_status tell_network(cli_run *run, const char *path, bool print, cli_report *r) {
+  unsigned samples = batten_network_options_default().check_samples;
+  batten_network *network = NULL;
+  batten_network_measures m;
+  batten_network_continuity c;
+  batten_status st = batten_read_network(run->ctx, path, &network);
+  if (st < 0) return st;
+  st = batten_network_measure(run->ctx, network, &m);
+  if (st >= 0) st = batten_network_measure_continuity(run->ctx, network, samples, &c);
+  if (st >= 0) {
+    cli_run_clear(run);
+    cli_report_count(r, "dimension", 3);
+    cli_report_count(r, "vertices", batten_network_vertex_count(network));
+    cli_report_count(r, "faces", batten_network_face_count(network));
+    cli_report_count(r, "patches", batten_network_patch_count(network));
+    network_report_measures(&m, &c, r);
+    if (print) {
+      cli_line("network", "%zu vertices, %zu facets, %zu patches", batten_network_vertex_count(network),
+               batten_network_face_count(network), batten_network_patch_count(network));
+      network_print_measures(&m, &c);
+    }
+  }
+  batten_network_free(network);
   return st;
 }
 
@@ -162,7 +191,7 @@ static bool no_option(cli_request *q, int key, const char *value) {
 }
 
 static int work(cli_request *q) {
-  static const char *const kinds[] = {"unknown",           "points",  "mesh", "solid", "carrier",
+  static const char *const kinds[] = {"unknown",           "points",  "mesh",    "solid", "carrier",
                                       "quadratic program", "network", "document"};
   cli_run run;
   if (!cli_run_open(&run, q->threads, 0, q->quiet)) return CLI_FAILED;
@@ -196,6 +225,8 @@ static int work(cli_request *q) {
         st = tell_qp(&run, q->input, print, &report);
         break;
       case BATTEN_FILE_NETWORK:
+        st = tell_network(&run, q->input, print, &report);
+        break;
       case BATTEN_FILE_DOCUMENT:
         break;
       case BATTEN_FILE_UNKNOWN:

@@ -13,6 +13,8 @@
 
 static const char *const surface_formats[] = {".ply", ".obj", ".stl", ".off", ".vtp", ".vtu", NULL};
 static const char *const outline_formats[] = {".svg", ".csv", ".xyz", ".txt", ".vtp", ".obj", NULL};
+static const char *const network_formats[] = {".step", ".stp", ".iges", ".igs", ".json", ".vtu",
+                                              ".ply",  ".obj", ".stl",  ".off", ".vtp",  NULL};
 static const char *const picture_formats[] = {".png", NULL};
 static const char *const plane_picture_formats[] = {".svg", ".png", NULL};
 static const char *const qp_formats[] = {".qps", ".sif", ".mps", ".json", NULL};
@@ -113,6 +115,26 @@ static bool same_file(const char *a, const char *b) {
   return stat(a, &x) == 0 && stat(b, &y) == 0 && x.st_dev == y.st_dev && x.st_ino == y.st_ino;
 }
 
+/* Kinds whose extensions do not depend on the data. */
+typedef struct rule {
+  cli_output_kind kind;
+  const char *const *formats;
+  const char *option, *use;
+} rule;
+
+static const rule *rule_of(cli_output_kind kind) {
+  static const rule rules[] = {
+      {CLI_OUTPUT_PICTURE, plane_picture_formats, "--picture", ".png, for plane solids also .svg"},
+      {CLI_OUTPUT_SHADED, picture_formats, "--picture", ".png"},
+      {CLI_OUTPUT_NETWORK, network_formats, "-o", ".step .iges .json .vtu, or of a mesh .ply .obj .stl .off .vtp"},
+      {CLI_OUTPUT_QP, qp_formats, "--write", ".qps or .json"},
+      {CLI_OUTPUT_QP_SOLUTION, qp_solution_formats, "-o", ".json or .csv"},
+  };
+  for (size_t i = 0; i < sizeof rules / sizeof *rules; i++)
+    if (rules[i].kind == kind) return &rules[i];
+  return NULL;
+}
+
 bool cli_outputs_check(cli_outputs *o, const char *input, bool *usage) {
   char known[128];
   *usage = true;
@@ -125,16 +147,9 @@ bool cli_outputs_check(cli_outputs *o, const char *input, bool *usage) {
                 known);
       return false;
     }
-    if (f->kind == CLI_OUTPUT_PICTURE && !has_extension(f->path, plane_picture_formats)) {
-      cli_error("%s: unknown extension for --picture; use .png, for plane solids also .svg", f->path);
-      return false;
-    }
-    if (f->kind == CLI_OUTPUT_QP && !has_extension(f->path, qp_formats)) {
-      cli_error("%s: unknown extension for --write; use .qps or .json", f->path);
-      return false;
-    }
-    if (f->kind == CLI_OUTPUT_QP_SOLUTION && !has_extension(f->path, qp_solution_formats)) {
-      cli_error("%s: unknown extension for -o; use .json or .csv", f->path);
+    const rule *r = rule_of(f->kind);
+    if (r && !has_extension(f->path, r->formats)) {
+      cli_error("%s: unknown extension for %s; use %s", f->path, r->option, r->use);
       return false;
     }
     if (input && same_file(f->path, input)) {

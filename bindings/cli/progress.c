@@ -91,20 +91,23 @@ static void substitute(char *text, size_t size, const char *from, const char *to
 
 void cli_run_text(const cli_run *run, batten_status status, char *text, size_t size) {
   static const char *const words[][2] = {
-      {"opt.merge_radius", "--merge-radius"},  {"opt.lower and opt.upper", "--box"},
-      {"opt.evaluations_max", "evaluations"},  {"opt.normals", "normals in the file"},
-      {"opt.spline.smoothing", "--smoothing"}, {"memory_limit", "--memory"},
-      {"opt.orientation", "--orientation"},    {"opt.cell", "--cell"},
-      {"opt.width, opt.height", "--size"},     {"opt.carrier", "--carrier"},
-      {", or opt.improve larger than 0", ""},  {"matrix.n: ", ""},
-      {"the context allows", "allowed are"},   {"opt.time_limit_s", "--time-limit"},
-      {"opt.iteration_limit", "--iterations"}, {"opt.tolerance_relative", "--tolerance"},
-      {"opt.tolerance_absolute", "--tolerance"},
+      {"opt.merge_radius", "--merge-radius"},    {"opt.lower and opt.upper", "--box"},
+      {"opt.evaluations_max", "evaluations"},    {"opt.normals", "normals in the file"},
+      {"opt.spline.smoothing", "--smoothing"},   {"memory_limit", "--memory"},
+      {"opt.orientation", "--orientation"},      {"opt.cell", "--cell"},
+      {"opt.width, opt.height", "--size"},       {"opt.carrier", "--carrier"},
+      {", or opt.improve larger than 0", ""},    {"matrix.n: ", ""},
+      {"the context allows", "allowed are"},     {"opt.time_limit_s", "--time-limit"},
+      {"opt.iteration_limit", "--iterations"},   {"batten_mesh_repair", "--repair"},
+      {"opt.tolerance_relative", "--tolerance"}, {"opt.tolerance_absolute", "--tolerance"},
   };
   const char *own = batten_error(run->ctx);
-  bool points = strncmp(own, "points", 6) == 0 || strncmp(own, "matrix", 6) == 0 || strncmp(own, "seeds", 5) == 0 ||
-                strncmp(own, "problem", 7) == 0;
-  snprintf(text, size, "%s%s%s", points && run->input ? run->input : "", points && run->input ? ": " : "",
+  static const char *const about_input[] = {"points", "matrix", "seeds",    "problem",
+                                            "edge",   "vert",   "triangle", "mesh"};
+  bool input = false;
+  for (size_t i = 0; i < sizeof about_input / sizeof *about_input; i++)
+    input = input || strncmp(own, about_input[i], strlen(about_input[i])) == 0;
+  snprintf(text, size, "%s%s%s", input && run->input ? run->input : "", input && run->input ? ": " : "",
            *own ? own : batten_status_text(status));
   for (size_t i = 0; i < sizeof words / sizeof *words; i++) substitute(text, size, words[i][0], words[i][1]);
   for (size_t i = 0; run->outputs && i < run->outputs->count; i++) {

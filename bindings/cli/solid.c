@@ -29,12 +29,8 @@ enum {
   OPT_LOO, /* last of those that tell how to fit */
   OPT_CELL,
   OPT_BOX,
-  OPT_VIEW,
-  OPT_UP,
   OPT_COLOR,
-  OPT_DOTS,
-  OPT_SIZE,
-  OPT_TITLE
+  OPT_DOTS
 };
 
 static const cli_option table[] = {
@@ -62,12 +58,12 @@ static const cli_option table[] = {
     CLI_OPTION_MEMORY,
     {"loo", OPT_LOO, "N", "leave-one-out errors of N points, all or none; default 256"},
     CLI_OPTION_THREADS,
-    {"view", OPT_VIEW, "AZ,EL", "direction of the picture's camera, degrees; default 35,22"},
-    {"up", OPT_UP, "AXIS", "x, y or z points upwards in the picture; default z"},
+    CLI_OPTION_VIEW,
+    CLI_OPTION_UP,
     {"color", OPT_COLOR, "WHAT", "colour the picture by none, gradient, mean or gauss (curvature); default none"},
     {"dots", OPT_DOTS, NULL, "draw the points in the picture"},
-    {"size", OPT_SIZE, "W,H", "picture's size in pixels; default 1200,900"},
-    {"title", OPT_TITLE, "TEXT", "title in the picture"},
+    CLI_OPTION_SIZE,
+    CLI_OPTION_TITLE,
     CLI_OPTION_QUIET,
     CLI_OPTION_HELP,
     {0},
@@ -139,9 +135,7 @@ static bool take_fit_option(solid_request *q, int key, const char *v) {
 }
 
 static bool take_view_option(solid_request *q, int key, const char *v) {
-  static const char *const axes[] = {"x", "y", "z", NULL};
   static const char *const colors[] = {"none", "gradient", "mean", "gauss", NULL};
-  double pair[2] = {0};
   int word = 0;
   switch (key) {
     case OPT_CELL:
@@ -149,38 +143,15 @@ static bool take_view_option(solid_request *q, int key, const char *v) {
     case OPT_BOX:
       q->box = v;
       return true;
-    case OPT_VIEW:
-      if (!cli_parse_numbers("--view", v, 2, pair)) return false;
-      if (fabs(pair[1]) > 90) {
-        cli_error("--view: elevation %g is not from -90 to 90", pair[1]);
-        return false;
-      }
-      q->picture.azimuth_deg = pair[0];
-      q->picture.elevation_deg = pair[1];
-      return true;
-    case OPT_UP:
-      if (!cli_parse_word("--up", v, axes, &word)) return false;
-      q->picture.up_axis = (unsigned)word;
-      return true;
     case OPT_COLOR:
       if (!cli_parse_word("--color", v, colors, &word)) return false;
       q->color = (solid_color)word;
-      return true;
-    case OPT_SIZE:
-      if (!cli_parse_numbers("--size", v, 2, pair)) return false;
-      if (!(pair[0] >= 16 && pair[0] <= 8192 && pair[1] >= 16 && pair[1] <= 8192)) {
-        cli_error("--size: '%s' is not two numbers of pixels from 16 to 8192", v);
-        return false;
-      }
-      q->picture.width = (unsigned)pair[0];
-      q->picture.height = (unsigned)pair[1];
       return true;
     case OPT_DOTS:
       q->dots = true;
       return true;
     default:
-      q->picture.title = v;
-      return true;
+      return cli_take_picture(&q->picture, key, v);
   }
 }
 
@@ -194,7 +165,7 @@ static bool take(cli_request *common, int key, const char *v) {
     case OPT_SAVE:
       return cli_outputs_add(&common->outputs, CLI_OUTPUT_SOLID, v);
     default:
-      return key <= OPT_LOO ? take_fit_option(q, key, v) : take_view_option(q, key, v);
+      return key >= CLI_KEY_OWN && key <= OPT_LOO ? take_fit_option(q, key, v) : take_view_option(q, key, v);
   }
 }
 

@@ -317,10 +317,7 @@ static void tell(net_work *w) {
   const net_topology *t = &w->topology;
   const net_figures *g = &w->figures;
   batten_network_info *i = &w->info;
-  double degree = is_fair(w->fill) ? -2
-                  : net_fill_continuity(w->fill) == 1 && w->opt.functional != BATTEN_FUNCTIONAL_SIMPLE
-                      ? -1 - w->opt.weight_power
-                      : 2 - w->opt.weight_power;
+  double degree = is_fair(w->fill) ? -2 : 2 - w->opt.weight_power;
   double unit = pow(w->scale, -degree);
   i->fill = w->fill;
   i->continuity = net_fill_continuity(w->fill);

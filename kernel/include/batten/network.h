@@ -47,7 +47,8 @@ typedef enum batten_network_direction { /* of an edge's curve in the tangent pla
                                         BATTEN_DIRECTION_D1 /* projection of the edge */
 } batten_network_direction;
 
-typedef enum batten_network_length {                       /* of the derivative at its end */
+typedef enum batten_network_length { /* of the derivative at its end. L3 and L4 shape the curves; normals are
+           optimised with L2, since with the others they come to no rest */
                                      BATTEN_LENGTH_L2 = 0, /* arc of the circle */
                                      BATTEN_LENGTH_L1,     /* chord */
                                      BATTEN_LENGTH_L3,     /* planar cubic of given curvatures [de Boor, Hollig, Sabin
@@ -63,7 +64,7 @@ typedef enum batten_network_functional {
 } batten_network_functional;
 
 typedef enum batten_network_solver {
-  BATTEN_NETWORK_AUTO = 0, /* CG for the 2N system, DIRECT for the 5N systems */
+  BATTEN_NETWORK_AUTO = 0, /* CG, but DIRECT for the 5N system of few nodes and for the fair fill */
   BATTEN_NETWORK_CG,       /* conjugate gradients, block-Jacobi */
   BATTEN_NETWORK_DIRECT    /* Cholesky */
 } batten_network_solver;
@@ -83,7 +84,8 @@ typedef struct batten_network_options {
   batten_network_direction direction;
   batten_network_length length;
   batten_network_functional functional;
-  double weight_power; /* edges count |E|^-weight_power, 0 .. 6. Default 3; the paper has 0. */
+  double weight_power; /* edges count |E|^-weight_power, 0 .. 6; with LAPLACE_BELTRAMI |E|^(3 - weight_power), which
+                          weighs alike. Default 3; the paper has 0. */
   double field_weight; /* of the cross-boundary field in the 5N system, >= 0. Default 0.32. */
   batten_network_solver solver;
 
