@@ -171,7 +171,7 @@ static void test_everyday(void) {
   T_CHECK(bad == 0, "%d numbers of everyday size are written as printf would (seed 7), %zu differ", 4 * N, bad);
   bad = 0;
   for (int e = -60; e <= 60; e++) {
-    char power[8];
+    char power[16];
     snprintf(power, sizeof power, "1e%d", e / 3);
     double values[2] = {ldexp(1, e), strtod(power, NULL)};
     for (int i = 0; i < 2; i++)

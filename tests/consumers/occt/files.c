@@ -99,11 +99,13 @@ static void write_nested(batch *b) {
 
 /* ---- surfaces that are made ------------------------------------------------------------------------------ */
 
-static void write_built(batch *b, const char *name, scene_mesh scene, batten_network_fill fill, size_t solids) {
+static void write_built(batch *b, const char *name, scene_mesh scene, batten_network_fill fill, double crease_deg,
+                        size_t solids) {
   batten_network_options o = batten_network_options_default();
   batten_mesh *mesh = NULL;
   batten_network *network = NULL;
   o.fill = fill;
+  o.crease_angle_deg = crease_deg;
   batten_status st = batten_mesh_create(b->ctx, scene.vertices, scene.points, scene.triangles, scene.corners, &mesh);
   if (st >= 0) st = batten_network_build(b->ctx, mesh, &o, &network, NULL);
   if (done(b, st, name))
@@ -111,8 +113,8 @@ static void write_built(batch *b, const char *name, scene_mesh scene, batten_net
                 &(known){.name = name,
                          .solids = solids,
                          .volume = NAN,
-                         .angle = fill == BATTEN_FILL_PN ? NAN : 1e-9,
-                         .large = scene.triangles > 200});
+                         .angle = fill == BATTEN_FILL_PN || crease_deg > 0 ? NAN : 1e-9,
+                         .large = scene.triangles > 100});
   batten_network_free(network);
   batten_mesh_free(mesh);
   scene_mesh_free(&scene);
@@ -124,12 +126,14 @@ int main(int argc, char **argv) {
   write_flat(&b);
   write_paraboloid(&b);
   write_nested(&b);
-  write_built(&b, "octahedron-fair", scene_mesh_octahedron_shifted(0.35, 0.2), BATTEN_FILL_FAIR, 1);
-  write_built(&b, "sphere-degree7", scene_mesh_sphere_irregular(), BATTEN_FILL_DEGREE7, 1);
-  write_built(&b, "torus-quartics", scene_mesh_torus_10_6(), BATTEN_FILL_SS, 1);
-  write_built(&b, "genus3-degree6", scene_mesh_genus3(), BATTEN_FILL_DEGREE6, 1);
-  write_built(&b, "graph-degree7", scene_mesh_graph_7(), BATTEN_FILL_DEGREE7, 0);
-  write_built(&b, "icosahedron-pn", scene_mesh_icosahedron(), BATTEN_FILL_PN, 1);
+  write_built(&b, "octahedron-fair", scene_mesh_octahedron_shifted(0.35, 0.2), BATTEN_FILL_FAIR, 0, 1);
+  write_built(&b, "sphere-degree7", scene_mesh_sphere_irregular(), BATTEN_FILL_DEGREE7, 0, 1);
+  write_built(&b, "torus-quartics", scene_mesh_torus_10_6(), BATTEN_FILL_SS, 0, 1);
+  write_built(&b, "genus3-degree6", scene_mesh_genus3(), BATTEN_FILL_DEGREE6, 0, 1);
+  write_built(&b, "graph-degree7", scene_mesh_graph_7(), BATTEN_FILL_DEGREE7, 0, 0);
+  write_built(&b, "icosahedron-pn", scene_mesh_icosahedron(), BATTEN_FILL_PN, 0, 1);
+  write_built(&b, "octahedron-quartics", scene_mesh_octahedron(), BATTEN_FILL_SS, 0, 1);
+  write_built(&b, "cube-creases", scene_mesh_cube_26(), BATTEN_FILL_DEGREE7, 40, 1);
   batten_context_free(b.ctx);
   return b.failed;
 }
