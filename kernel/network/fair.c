@@ -22,7 +22,6 @@
 #include "fair.h"
 
 enum {
-  PARTS_MAX = 64,     /* no loop uses more threads */
   ITEMS_PER_PART = 4, /* facets at some 20 us at least */
   TRIALS_MAX = 12,    /* of damping in a pass */
   LINEAR_PASSES = 2
@@ -60,7 +59,7 @@ typedef struct fair_job {
   batten_network_options opt;
   fair_model model;
   fair_tables *tables;
-  fair_scratch *scratch; /* [PARTS_MAX] or fewer */
+  fair_scratch *scratch; /* [FAIR_PARTS_MAX] or fewer */
   fair_state now, next;
   fair_equations *equations; /* [faces] */
   double *reduced;           /* [faces][FAIR_REDUCED] */
@@ -86,7 +85,7 @@ typedef struct fair_loop {
 
 static size_t parts_of(size_t items) {
   size_t parts = (items + ITEMS_PER_PART - 1) / ITEMS_PER_PART;
-  return parts < PARTS_MAX ? parts : PARTS_MAX;
+  return parts < FAIR_PARTS_MAX ? parts : FAIR_PARTS_MAX;
 }
 
 static void run_part(void *arg, size_t part) {

@@ -14,12 +14,13 @@
 #include "sparse/block.h"
 
 enum {
-  FAIR_POINTS = 16, /* of quadrature, on a facet */
-  FAIR_FIELDS = 9,  /* S_u, S_v, S_uu, S_uv, S_vv, S_uuu, S_uuv, S_uvv, S_vvv */
-  FAIR_NET = 36,    /* control points of degree 7 */
-  FAIR_ROWS = 4,    /* residuals at a point */
-  FAIR_INNER = 9,   /* unknown displacements of a facet's three inner control points */
-  FAIR_OUTER = 15,  /* and five at each corner */
+  FAIR_POINTS = 16,    /* of quadrature, on a facet */
+  FAIR_FIELDS = 9,     /* S_u, S_v, S_uu, S_uv, S_vv, S_uuu, S_uuv, S_uvv, S_vvv */
+  FAIR_PARTS_MAX = 64, /* of a loop: none uses more threads */
+  FAIR_NET = 36,       /* control points of degree 7 */
+  FAIR_ROWS = 4,       /* residuals at a point */
+  FAIR_INNER = 9,      /* unknown displacements of a facet's three inner control points */
+  FAIR_OUTER = 15,     /* and five at each corner */
   FAIR_UNKNOWNS = FAIR_INNER + FAIR_OUTER,
   FAIR_LANES = 16, /* columns of the derivative by the corners, padded */
   FAIR_PACKED = (FAIR_UNKNOWNS + 1) * (FAIR_UNKNOWNS + 2) / 2,

@@ -18,7 +18,7 @@
 #include "network/fill.h"
 #include "sparse/block.h"
 
-enum { ITEMS_PER_TASK = 256, CG_MOST = 500, DIRECT_MOST = 2000 };
+enum { ITEMS_PER_TASK = 256, CG_MOST = 500 };
 
 /* Residuals: wanted, and enough: nodes that the safety term alone settles leave some 1e-12. */
 static const double SAFETY = 1e-12, TOLERANCE = 1e-13, ENOUGH = 1e-10;
@@ -330,7 +330,8 @@ static batten_status solve_direct(batten_context *ctx, g2_job *job) {
 static batten_status solve(batten_context *ctx, g2_job *job, net_figures *figures) {
   block_cg_figures cg = {0};
   batten_network_solver solver = job->opt->solver;
-  bool direct = solver == BATTEN_NETWORK_DIRECT || (solver == BATTEN_NETWORK_AUTO && job->t->nodes < DIRECT_MOST);
+  bool direct =
+      solver == BATTEN_NETWORK_DIRECT || (solver == BATTEN_NETWORK_AUTO && job->t->nodes < NET_DIRECT_NODES);
   batten_status st = direct ? solve_direct(ctx, job) : BATTEN_OK;
   if (st >= 0) st = block_cg(ctx, &job->a, job->rhs, TOLERANCE, CG_MOST, "network", job->y, &cg);
   figures->cg_iterations += cg.iterations;

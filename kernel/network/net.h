@@ -3,6 +3,7 @@
  *   network.c    the public call as a list of phases; options; figures
  *   topology.c   half-edges, edges, fans, nodes (one tangent plane each: a vertex, or a sector between creases);
  *                checks that name what is wrong
+ *   bytes.c      the memory that a build will take
  *   features.c   creases, corners, boundary curves, polylines: fixed directions and curvatures
  *   normals.c    estimated normals at the nodes
  *   tangent.c    D1, D2 and L1 .. L4: the local parameters t, s of an edge; curvature estimate
@@ -169,6 +170,9 @@ void net_ribbon_make(const double *vi, const double *vj, const net_node *i, cons
                      const double (*bend)[3], net_ribbon *out);
 void net_ribbon_reverse(const net_ribbon *in, net_ribbon *out); /* run the other way, the field to its left again:
                                                                    the other side of a smooth edge */
+
+/* Systems of fewer nodes are solved by Cholesky where the choice is ours. */
+enum { NET_DIRECT_NODES = 2000 };
 
 /* One linear solve: nodes [nodes] get frames (from normals) and x. local [edges] as used. Progress "network". */
 batten_status net_g2(batten_context *ctx, const net_topology *t, const batten_network_options *opt,

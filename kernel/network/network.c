@@ -114,21 +114,11 @@ static batten_status make_network(net_work *w) {
 
 /* ---- fill ------------------------------------------------------------------------------------------- */
 
-static void fill_degree(batten_network_fill fill, unsigned *degree, unsigned *parts) {
-  bool split = fill == BATTEN_FILL_SS || fill == BATTEN_FILL_SS_CLASSIC || fill == BATTEN_FILL_DEGREE6;
-  *parts = split ? 3 : 1;
-  *degree = fill == BATTEN_FILL_DEGREE6  ? 6
-            : split                      ? 4
-            : fill == BATTEN_FILL_PETERS ? 5
-            : fill == BATTEN_FILL_PN     ? 3
-                                         : 7;
-}
-
 /* The handle, its control points still to be written. */
 static batten_status make_surface(net_work *w) {
   const net_topology *t = &w->topology;
   unsigned degree, parts;
-  fill_degree(w->fill, &degree, &parts);
+  net_fill_degree(w->fill, &degree, &parts);
   size_t count = 0;
   uint32_t *creases = batten_alloc_array(w->ctx, t->crease_edges, 2 * sizeof *creases);
   if (!creases) return BATTEN_E_NOMEM;

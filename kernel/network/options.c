@@ -28,6 +28,16 @@ unsigned net_fill_continuity(batten_network_fill fill) {
   }
 }
 
+void net_fill_degree(batten_network_fill fill, unsigned *degree, unsigned *parts) {
+  bool split = fill == BATTEN_FILL_SS || fill == BATTEN_FILL_SS_CLASSIC || fill == BATTEN_FILL_DEGREE6;
+  *parts = split ? 3 : 1;
+  *degree = fill == BATTEN_FILL_DEGREE6  ? 6
+            : split                      ? 4
+            : fill == BATTEN_FILL_PETERS ? 5
+            : fill == BATTEN_FILL_PN     ? 3
+                                         : 7;
+}
+
 static batten_status check_words(batten_context *ctx, const batten_network_options *o) {
   const struct {
     const char *name;

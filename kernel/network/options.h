@@ -14,4 +14,7 @@ batten_network_fill net_options_fill(const batten_network_options *o, size_t fac
 /* 1 or 2: the network that a fill (not AUTO) is made for. */
 unsigned net_fill_continuity(batten_network_fill fill);
 
+/* Of its patches: their degree, and how many make up a facet. */
+void net_fill_degree(batten_network_fill fill, unsigned *degree, unsigned *parts);
+
 #endif

@@ -143,7 +143,8 @@ BATTEN_API batten_status batten_network_build(batten_context *ctx, const batten_
                                               batten_network_info *info);
 
 /* Bytes that batten_network_build takes at most for a mesh of so many vertices and triangles, and those that the
- * result keeps. The direct solver's share is an estimate for meshes that are pieces of surface. */
+ * result keeps (where no facet is split). An estimate for what Cholesky takes, since that depends on the mesh, and
+ * where creases divide many vertices. build and kept may be NULL. Fails: INVALID, TOO_LARGE. */
 BATTEN_API batten_status batten_network_bytes(batten_context *ctx, size_t vertices, size_t triangles,
                                               const batten_network_options *opt, size_t *build, size_t *kept);
 
@@ -284,9 +285,9 @@ typedef struct batten_lines_options {
 } batten_lines_options;
 BATTEN_API batten_lines_options batten_lines_options_default(void);
 
-/* The quantity of which lines show the levels 1/2, 3/2, .. count - 1/2, in units of the distance of two lines, at every
- * vertex of a mesh that batten_network_tessellate made: values [its vertices]; NaN without a normal. REFLECTION: it
- * goes all around, and jumps by count somewhere; the lines below have no seam there. */
+/* The quantity of which lines show the levels 1/2, 3/2, .. count - 1/2, in units of the distance of two lines, at
+ * every vertex of a mesh that batten_network_tessellate made: values [its vertices]; NaN without a normal.
+ * REFLECTION: it goes all around, and jumps by count somewhere; the lines below have no seam there. */
 BATTEN_API batten_status batten_network_line_values(batten_context *ctx, const batten_mesh *tessellation,
                                                     const batten_lines_options *opt, double *values);
 
