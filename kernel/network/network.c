@@ -288,11 +288,13 @@ static batten_status check(net_work *w) {
     return batten_fail(w->ctx, BATTEN_W_ACCURACY, "the sides of an edge are %.2g apart, of the size %.2g", i->gap_max,
                        w->size);
   if (!(i->normal_jump_max_deg <= JUMP_TOLERANCE_DEG)) {
-    const batten_joint_figures *worst = c.smooth.normal_max_deg >= c.inner.normal_max_deg ? &c.smooth : &c.inner;
+    if (c.inner.normal_max_deg > c.smooth.normal_max_deg)
+      return batten_fail(w->ctx, BATTEN_W_ACCURACY, "normals differ by up to %.2g degrees inside triangle %lu%s",
+                         i->normal_jump_max_deg, (unsigned long)c.inner.worst_face[0], remedy);
     return batten_fail(w->ctx, BATTEN_W_ACCURACY,
                        "normals differ by up to %.2g degrees across the edge between triangles %lu and %lu%s",
-                       i->normal_jump_max_deg, (unsigned long)worst->worst_face[0],
-                       (unsigned long)worst->worst_face[1], remedy);
+                       i->normal_jump_max_deg, (unsigned long)c.smooth.worst_face[0],
+                       (unsigned long)c.smooth.worst_face[1], remedy);
   }
   if (i->irregular_faces)
     return batten_fail(w->ctx, BATTEN_W_ACCURACY, "%zu facets are not proven to have a normal everywhere",
