@@ -64,6 +64,24 @@ static batten_status find_edges(const network_work *w, unsigned density, drawing
   return st;
 }
 
+/* Curvatures that differ by less, of the size of the surface, are rounding: what is flat gets one colour. */
+static const double equal_curvatures = 1e-9;
+
+static void choose_range(const batten_network_measures *m, bool gauss, batten_picture_options *o) {
+  if (o->color_lower < o->color_upper) return; /* as asked for */
+  double size = hypot(hypot(m->upper[0] - m->lower[0], m->upper[1] - m->lower[1]), m->upper[2] - m->lower[2]);
+  double low = gauss ? m->gauss_p02 : m->mean_min, high = gauss ? m->gauss_p98 : m->mean_max;
+  double least = equal_curvatures / (gauss ? size * size : size);
+  if (!(isfinite(low) && isfinite(high) && isfinite(least))) return;
+  if (high - low < least) {
+    o->color_lower = 0.5 * (low + high) - 0.5 * least;
+    o->color_upper = 0.5 * (low + high) + 0.5 * least;
+  } else if (gauss) {
+    o->color_lower = low;
+    o->color_upper = high;
+  }
+}
+
 static batten_status color(const network_work *w, drawing *d, batten_picture_options *o) {
   network_color what = w->request->color;
   batten_status st = BATTEN_OK;
@@ -72,10 +90,7 @@ static batten_status color(const network_work *w, drawing *d, batten_picture_opt
     o->colors = field(d->mesh, gauss ? "gauss" : "mean");
     o->color_label = gauss ? "Gaussian curvature" : "mean curvature";
     o->color_map = BATTEN_MAP_RAINBOW;
-    if (gauss && o->color_lower == o->color_upper && w->measures.gauss_p02 < w->measures.gauss_p98) {
-      o->color_lower = w->measures.gauss_p02;
-      o->color_upper = w->measures.gauss_p98;
-    }
+    choose_range(&w->measures, gauss, o);
   } else if (what != NETWORK_PLAIN) {
     batten_lines_options l = batten_lines_options_default();
     l.kind = what == NETWORK_ISOPHOTES ? BATTEN_LINES_ISOPHOTE : BATTEN_LINES_REFLECTION;
@@ -89,27 +104,34 @@ static batten_status color(const network_work *w, drawing *d, batten_picture_opt
   return st;
 }
 
-/* So many segments for each edge that the picture is smooth where facets are large. */
-static unsigned picture_density(const network_work *w) {
+/* A quarter of the pixels that an edge has, about. */
+static double picture_fineness(const network_work *w) {
   double pixels = (double)w->request->picture.width * w->request->picture.height;
-  double sides =
-      sqrt(pixels / (4 * (double)batten_network_face_count(w->network) + 1)); /* pixels of an edge, about */
-  return (unsigned)fmin(fmax(sides / 4, 3), 64);
+  return sqrt(pixels / (4 * (double)batten_network_face_count(w->network) + 1));
 }
+
+/* So many segments for each edge that the picture is smooth where facets are large. */
+static unsigned picture_density(double fineness) {
+  return (unsigned)fmin(fmax(fineness / 4, fmax(1, fmin(fineness, 3))), 32);
+}
+
+/* Where facets are smaller their boundaries would be all that is seen. */
+static const double fineness_for_edges = 3;
 
 batten_status network_draw(const network_work *w, const char *path) {
   batten_context *ctx = w->run.ctx;
   drawing d = {0};
   batten_picture_options o = w->request->picture;
   batten_tessellate_options t = batten_tessellate_options_default();
-  t.density = picture_density(w);
+  double fineness = picture_fineness(w);
+  t.density = picture_density(fineness);
   t.per_patch = 1;
   batten_status st = batten_network_tessellate(ctx, w->network, &t, &d.mesh);
   if (st >= 0) {
     o.normals = field(d.mesh, "normal");
     st = color(w, &d, &o);
   }
-  if (st >= 0 && !w->request->no_edges) {
+  if (st >= 0 && !w->request->no_edges && fineness >= fineness_for_edges) {
     st = find_edges(w, t.density, &d);
     o.edge_count = d.edge_count;
     o.edges = d.edges;

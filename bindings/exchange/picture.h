@@ -9,7 +9,7 @@
 #include <batten/exchange.h>
 #include <stdbool.h>
 
-enum { PICTURE_SIDE_MIN = 16, PICTURE_SIDE_MAX = 8192, PICTURE_TICK_SIZE = 48 };
+enum { PICTURE_SIDE_MIN = 16, PICTURE_SIDE_MAX = 8192, PICTURE_TICK_SIZE = 64 };
 
 typedef struct picture_color {
   float r, g, b; /* linear light, 0 .. 1 */

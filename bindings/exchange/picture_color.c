@@ -86,9 +86,17 @@ void picture_tick_text(const picture_ticks *t, size_t i, char text[PICTURE_TICK_
   const char *sign = whole < 0 ? "-" : "";
   if (whole == 0)
     snprintf(text, PICTURE_TICK_SIZE, "0");
-  else if (t->exponent > 5 || t->exponent < -6)
-    snprintf(text, PICTURE_TICK_SIZE, "%s%llue%d", sign, size, t->exponent);
-  else if (t->exponent >= 0) {
+  else if (t->exponent > 5 || t->exponent < -4) {
+    int exponent = t->exponent, digits = 0; /* behind the point */
+    unsigned long long unit = 1;
+    for (; size % 10 == 0; size /= 10) exponent++;
+    for (; digits < 19 && size / unit >= 10; unit *= 10) digits++;
+    exponent += digits;
+    if (unit == 1)
+      snprintf(text, PICTURE_TICK_SIZE, "%s%llue%d", sign, size, exponent);
+    else
+      snprintf(text, PICTURE_TICK_SIZE, "%s%llu.%0*llue%d", sign, size / unit, digits, size % unit, exponent);
+  } else if (t->exponent >= 0) {
     for (int k = 0; k < t->exponent; k++) size *= 10;
     snprintf(text, PICTURE_TICK_SIZE, "%s%llu", sign, size);
   } else {

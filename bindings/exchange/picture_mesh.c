@@ -113,7 +113,7 @@ static batten_status color_range(batten_context *ctx, size_t count, batten_pictu
   o->color_lower = n ? sorted[(n - 1) / 100] : 0;
   o->color_upper = n ? sorted[n - 1 - (n - 1) / 100] : 1;
   if (!(o->color_lower < o->color_upper)) { /* one value everywhere: the middle colour */
-    double margin = fmax(fabs(o->color_lower), 1e-300) * 0.5;
+    double margin = o->color_lower == 0 ? 1 : 0.5 * fabs(o->color_lower);
     o->color_lower -= margin;
     o->color_upper += margin;
   }
@@ -134,7 +134,8 @@ static void take_normals(size_t count, const double *given, double *normals) {
   for (size_t i = 0; i < count; i++, given += 3, normals += 3) {
     double largest = fmax(fabs(given[0]), fmax(fabs(given[1]), fabs(given[2])));
     if (!(largest > 0) || !isfinite(given[0] + given[1] + given[2])) continue;
-    double x = given[0] / largest, y = given[1] / largest, z = given[2] / largest, length = sqrt(x * x + y * y + z * z);
+    double x = given[0] / largest, y = given[1] / largest, z = given[2] / largest,
+           length = sqrt(x * x + y * y + z * z);
     normals[0] = x / length;
     normals[1] = y / length;
     normals[2] = z / length;
@@ -227,16 +228,49 @@ static picture_camera camera_fit(const picture_scene *s, const batten_picture_op
 
 /* ---- lettering over it --------------------------------------------------------------------------- */
 
+static picture_ticks color_ticks(const batten_picture_options *o) {
+  return picture_ticks_choose(o->color_lower, o->color_upper, 6);
+}
+
+/* The bar's own width, the numbers to its right, and a margin; all in units of the lettering's height. */
+static const double bar_width = 1.2, bar_to_numbers = 0.75, bar_margin = 0.8;
+
+static double color_bar_room(const batten_picture_options *o, double unit) {
+  picture_ticks ticks = color_ticks(o);
+  double numbers = 0;
+  for (size_t i = 0; i < ticks.count; i++) {
+    char text[PICTURE_TICK_SIZE];
+    picture_tick_text(&ticks, i, text);
+    numbers = fmax(numbers, picture_text_width(unit, text));
+  }
+  return fmax(7 * unit, (bar_width + bar_to_numbers + bar_margin) * unit + numbers);
+}
+
+/* Over the bar; in two lines, parted at the last blank, where one would reach into the view. */
+static void draw_color_label(picture_image *im, const char *label, double x, double base, double unit) {
+  double end = (double)im->width - bar_margin * unit;
+  const char *blank = picture_text_width(unit, label) > end - x ? strrchr(label, ' ') : NULL;
+  char first[128];
+  size_t length = blank ? (size_t)(blank - label) : 0;
+  if (length > 0 && length < sizeof first) {
+    memcpy(first, label, length);
+    first[length] = '\0';
+    picture_mask_text(im, fmin(x, end - picture_text_width(unit, first)), base - 1.6 * unit, unit, 1, first);
+    label = blank + 1;
+  }
+  picture_mask_text(im, fmin(x, end - picture_text_width(unit, label)), base, unit, 1, label);
+}
+
 /* Vertical bar in [x, x + width] x [top, bottom] with ticks and numbers to its right. */
 static void draw_color_bar(picture_image *im, const batten_picture_options *o, double x, double top, double bottom,
                            double unit) {
-  double width = 1.2 * unit;
+  double width = bar_width * unit;
   for (size_t y = (size_t)top; y < (size_t)bottom; y++) {
     picture_mask_rectangle(im, x, (double)y, x + width, (double)y + 1);
     picture_blend(im, picture_colormap(o->color_map, (bottom - (double)y - 0.5) / (bottom - top)), 1);
   }
   const picture_color ink = picture_srgb(0x2a2d33);
-  picture_ticks ticks = picture_ticks_choose(o->color_lower, o->color_upper, 6);
+  picture_ticks ticks = color_ticks(o);
   for (size_t i = 0; i < ticks.count; i++) {
     double t = (picture_tick_value(&ticks, i) - o->color_lower) / (o->color_upper - o->color_lower);
     double y = bottom - t * (bottom - top);
@@ -244,14 +278,10 @@ static void draw_color_bar(picture_image *im, const batten_picture_options *o, d
     char text[PICTURE_TICK_SIZE];
     picture_tick_text(&ticks, i, text);
     picture_mask_capsule(im, x + width, y, x + width + 0.4 * unit, y, 0.05 * unit);
-    picture_mask_text(im, x + width + 0.75 * unit, y + 0.5 * unit, unit, 1, text);
+    picture_mask_text(im, x + width + bar_to_numbers * unit, y + 0.5 * unit, unit, 1, text);
   }
+  if (o->color_label) draw_color_label(im, o->color_label, x, top - 1.1 * unit, unit);
   picture_blend(im, ink, 0.9);
-  if (o->color_label) {
-    double end = x + width + 4 * unit, wide = picture_text_width(unit, o->color_label);
-    picture_mask_text(im, fmin(x, end - wide), top - 1.1 * unit, unit, 1, o->color_label);
-    picture_blend(im, ink, 0.9);
-  }
 }
 
 batten_status batten_picture_mesh(batten_context *ctx, const batten_mesh *mesh, const batten_picture_options *opt,
@@ -278,9 +308,9 @@ batten_status batten_picture_mesh(batten_context *ctx, const batten_mesh *mesh, 
   double unit = fmax(7, fmin(o.width, o.height) / 52.0), top = o.title ? 3.4 * unit : 0;
   double margin = 0.055 * fmin(o.width, o.height), bar = 0;
   bool has_bar = o.colors && o.color_map != BATTEN_MAP_STRIPES;
-  if (has_bar) bar = 7 * unit;
-  st = scene_make(ctx, mesh, &o, &scene);
+  st = scene_make(ctx, mesh, &o, &scene); /* which settles the range of the colours */
   if (st < 0) return st;
+  if (has_bar) bar = color_bar_room(&o, unit);
   buffer.nearness = batten_alloc_array(ctx, buffer.width * buffer.height, sizeof *buffer.nearness);
   buffer.item = batten_alloc_array(ctx, buffer.width * buffer.height, sizeof *buffer.item);
   buffer.screen = batten_alloc_array(ctx, V, 3 * sizeof *buffer.screen);

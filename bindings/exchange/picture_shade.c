@@ -11,8 +11,8 @@
 #include <string.h>
 
 enum {
-  SKY_BEAMS = 120,
-  KEY_BEAMS = 24,
+  SKY_BEAMS = 64,
+  KEY_BEAMS = 16,
   RIM_BEAMS = 8,
   BEAMS = SKY_BEAMS + KEY_BEAMS + RIM_BEAMS,
   BATCH = 8,    /* depth maps that are held at a time */
@@ -50,7 +50,7 @@ typedef struct shading {
   float taps[TAPS][2];
   float *maps;        /* [BATCH][map][map] */
   float *turned;      /* [BATCH][vertex_count][3] vertices in a beam's frame */
-  size_t map, ground; /* sides of a depth map and of the ground's grid */
+  size_t map, ground; /* sides of the batch's depth maps and of the ground's grid */
   float reach;        /* half the side of the ground's grid */
 } shading;
 
@@ -285,7 +285,7 @@ static void fill_map(void *arg, size_t index) {
 }
 
 /* Part of a beam that reaches p: the four texels about it, each lit or not, blended. */
-static float reached(const float *map, size_t size, const beam *b, const float p[3]) {
+static inline float reached(const float *map, size_t size, const beam *b, const float p[3]) {
   const float bias = 1 / (float)size;
   float x = (dotf(b->u, p) + 1) * 0.5f * (float)size - 0.5f, y = (dotf(b->v, p) + 1) * 0.5f * (float)size - 0.5f;
   float depth = dotf(b->d, p) + bias;
@@ -310,7 +310,7 @@ static float reached_about(const shading *s, const float *map, const beam *b, co
 }
 
 static void make_taps(float taps[TAPS][2]) {
-  const float radius = 0.047f; /* of the unit ball: as far as the shadows of neighbouring beams lie apart */
+  const float radius = 0.06f; /* of the unit ball: as far as the shadows of neighbouring beams lie apart */
   for (int i = 0; i < TAPS; i++) {
     float r = radius * sqrtf(((float)i + 0.5f) / TAPS), angle = golden_angle * (float)i;
     taps[i][0] = r * cosf(angle);
@@ -433,7 +433,8 @@ batten_status picture_shade(batten_context *ctx, const picture_scene *scene, con
   s->ground = s->map * 3 / 8;
   make_taps(s->taps);
   s->row_first = batten_alloc_array(ctx, height + 1, sizeof *s->row_first);
-  s->maps = batten_alloc_array(ctx, BATCH * s->map * s->map, sizeof *s->maps);
+  size_t fine = s->map;
+  s->maps = batten_alloc_array(ctx, BATCH * fine * fine, sizeof *s->maps);
   s->turned = batten_alloc_array(ctx, scene->vertex_count, BATCH * 3 * sizeof *s->turned);
   if (!s->row_first || !s->maps || !s->turned) goto done;
   s->row_first[0] = 0;
@@ -449,6 +450,7 @@ batten_status picture_shade(batten_context *ctx, const picture_scene *scene, con
     if (st < 0) goto done;
     s->beam_first = k;
     s->beam_end = k + BATCH < BEAMS ? k + BATCH : BEAMS;
+    s->map = s->beams[k].glossy ? fine : fine / 2; /* the many beams of the sky blur each other's edges */
     batten_parallel(ctx, s->beam_end - k, fill_map, s);
     batten_parallel(ctx, (s->total + CHUNK - 1) / CHUNK, light_chunk, s);
   }

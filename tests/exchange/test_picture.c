@@ -123,6 +123,10 @@ static void test_numbers(void) {
   check_ticks(1234, 5678, 4, "2000 3000 4000 5000");
   check_ticks(-3e9, 3e9, 3, "-2e9 0 2e9");
   check_ticks(1e-12, 5e-12, 4, "1e-12 2e-12 3e-12 4e-12 5e-12");
+  check_ticks(-2e-16, 2.2e-16, 6, "-2e-16 -1.5e-16 -1e-16 -5e-17 0 5e-17 1e-16 1.5e-16 2e-16");
+  check_ticks(0, 0.00022, 4, "0 5e-5 1e-4 1.5e-4 2e-4");
+  check_ticks(1.015e-6, 1.035e-6, 4, "1.015e-6 1.02e-6 1.025e-6 1.03e-6 1.035e-6");
+  check_ticks(1.05e9, 1.09e9, 4, "1.05e9 1.06e9 1.07e9 1.08e9 1.09e9");
   check_ticks(2, 2, 5, "");
   check_ticks(7e6, 7e6 + 2, 4, "7000000.0 7000000.5 7000001.0 7000001.5 7000002.0");
   double last = -1;
@@ -179,6 +183,16 @@ static void test_ball(batten_context *ctx, const batten_mesh *ball) {
           dark[1]);
   const unsigned char *ground = p.rgb + 3 * (228 * 320 + 150), *open = p.rgb + 3 * (228 * 320 + 10);
   T_CHECK(ground[1] + 15 < open[1], "and the ball's shadow lies on the ground: %d beside %d", ground[1], open[1]);
+  free(p.rgb);
+  o.color_lower = 7e6, o.color_upper = 7e6 + 2, o.color_label = "a label of several words";
+  T_OK(batten_picture_mesh(ctx, ball, &o, path_a), ctx);
+  p = read_png(path_a);
+  int darkest = 255;
+  for (size_t i = 0; i < 3 * p.height; i++) {
+    const unsigned char *c = p.rgb + 3 * (i / 3 * 320 + 317 + i % 3);
+    if (c[1] < darkest) darkest = c[1];
+  }
+  T_CHECK(darkest > 150, "long numbers and labels stay within the picture: %d in its last columns", darkest);
   free(p.rgb);
   free(colors);
 }
