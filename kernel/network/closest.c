@@ -6,7 +6,9 @@
  * convex: its one minimum is found by Newton's method, inside or on the sides, and what is left to gain is told by
  * the gradient g there: no place y of the part has f(y) < f(x) + min over the corners of g . (corner - x). f is
  * convex where the Bernstein coefficients of its second derivatives, as 2 x 2 matrices, are all positive definite.
- * All other parts are split in four. */
+ * All other parts are split in four. Patches that are all but equally near along a whole curve (collapsed or bent
+ * around the point) would be split without end: after many parts more and more may be missed, and the caller is told
+ * how much. */
 #include "surface.h"
 
 #include "base/checked.h"
@@ -18,12 +20,15 @@
 enum {
   DEPTH = 26, /* parts of 2^-26: what is between them and the surface is below rounding */
   PARTS = 3 * DEPTH + 4,
+  /* Parts of a patch before more may be missed: a second. Most take a few, with a circle of nearest places 5e4. */
+  PATIENCE = 1 << 17,
   QUERIES = 16, /* of a task */
   BATCH = 16,   /* tasks between two progress calls; each has scratch */
   TREE_STACK = 64
 };
-/* What the distance may miss, in sizes of the surface: half of what is promised. */
-static const double MISS = 0.5e-12;
+/* What the distance may miss, in sizes of the surface: half of what is promised. After each PATIENCE so many times
+ * more. */
+static const double MISS = 0.5e-12, CONCESSION = 16;
 
 typedef struct part {
   double corner[3][2]; /* in the patch */
@@ -35,6 +40,12 @@ typedef struct weights {
   double *of[2 * TRIANGULAR_DEGREE + 1];
 } weights;
 
+/* The point of a task whose distance may be off by most, where that is more than was promised: 0 otherwise. */
+typedef struct doubt {
+  size_t point;
+  double miss;
+} doubt;
+
 typedef struct job {
   const batten_network *network;
   const net_patch_tree *tree;
@@ -43,9 +54,10 @@ typedef struct job {
   size_t count, first_task, size;
   const double *points;
   batten_place *places;
-  double *distances; /* or NULL */
-  double *work;      /* [BATCH][size] */
-  part *parts;       /* [BATCH][PARTS] */
+  double *distances;
+  double *work;  /* [BATCH][size] */
+  part *parts;   /* [BATCH][PARTS] */
+  doubt *doubts; /* [BATCH] */
 } job;
 
 /* One point's search. */
@@ -53,6 +65,8 @@ typedef struct search {
   const job *job;
   const double *point;
   double best, best2; /* distance, and its square */
+  double slack;       /* how many times what is promised may be missed: on the patch in hand */
+  double miss;        /* of patches with a slack above 1, the most */
   batten_place place;
   uint32_t patch;
   unsigned degree;
@@ -62,7 +76,7 @@ typedef struct search {
 } search;
 
 /* What the distance may miss: rounding of it too. */
-static double may_miss(const search *s) { return s->job->miss + 8 * DBL_EPSILON * s->best; }
+static double may_miss(const search *s) { return s->slack * (s->job->miss + 8 * DBL_EPSILON * s->best); }
 
 /* ---- the minimum on a part ---------------------------------------------------------------------- */
 
@@ -280,12 +294,14 @@ static void search_patch(search *s, uint32_t patch) {
   size_t count = triangular_count(n), height = 1;
   for (size_t i = 0; i < count; i++) vec_sub(from[i], s->point, s->net[i]);
   if (reach(n, (const double(*)[3])s->net) >= s->best) return;
+  s->slack = 1;
   part *parts = s->parts;
   parts[0] = whole;
   guess(s, &whole);
   memcpy(s->nets, s->net, count * sizeof *s->net);
-  while (height > 0) {
+  for (size_t looked = 1; height > 0; looked++) {
     part p = parts[--height];
+    if (looked % PATIENCE == 0) s->slack *= CONCESSION;
     double *top = s->nets + height * 3 * count;
     const double(*net)[3] = (const double(*)[3])top;
     if (reach(n, net) >= s->best) continue;
@@ -301,6 +317,7 @@ static void search_patch(search *s, uint32_t patch) {
     split_part(n, &p, (const double(*)[3])s->scratch, top, parts + height, s->scratch + 3 * count);
     height += 4;
   }
+  if (s->slack > 1) s->miss = fmax(s->miss, may_miss(s));
 }
 
 /* The place is as near as is promised, but may be off along the surface: a last descent. */
@@ -354,15 +371,18 @@ static void search_some(void *arg, size_t index) {
   const job *j = arg;
   size_t from = (j->first_task + index) * QUERIES;
   search s = {.job = j, .nets = j->work + index * j->size, .parts = j->parts + index * PARTS};
+  j->doubts[index] = (doubt){0};
   s.square = s.nets + j->size - triangular_count(2 * TRIANGULAR_DEGREE);
   s.scratch = s.nets + 3 * TRIANGULAR_MAX * (size_t)PARTS;
   for (size_t i = from; i < from + QUERIES && i < j->count; i++) {
     s.point = j->points + 3 * i;
     s.best = s.best2 = INFINITY;
+    s.miss = 0;
     search_tree(&s);
     polish(&s);
     j->places[i] = s.place;
-    if (j->distances) j->distances[i] = s.best;
+    j->distances[i] = s.best;
+    if (s.miss > j->doubts[index].miss) j->doubts[index] = (doubt){i, s.miss};
   }
 }
 
@@ -388,13 +408,24 @@ static double *make_weights(batten_context *ctx, weights *out) {
 
 static batten_status search_all(batten_context *ctx, job *j) {
   size_t tasks = j->count / QUERIES + (j->count % QUERIES > 0);
+  doubt doubts[BATCH], worst = {0};
+  j->doubts = doubts;
   for (size_t done = 0; done < tasks; done += BATCH) {
     batten_status st = batten_progress(ctx, "closest", (double)done / (double)tasks);
     if (st < 0) return st;
+    size_t now = tasks - done < BATCH ? tasks - done : BATCH;
     j->first_task = done;
-    batten_parallel(ctx, tasks - done < BATCH ? tasks - done : BATCH, search_some, j);
+    batten_parallel(ctx, now, search_some, j);
+    for (size_t i = 0; i < now; i++)
+      if (doubts[i].miss > worst.miss) worst = doubts[i];
   }
-  return batten_progress(ctx, "closest", 1);
+  batten_status st = batten_progress(ctx, "closest", 1);
+  if (st < 0 || !(worst.miss > 0)) return st;
+  return batten_fail(
+      ctx, BATTEN_W_ACCURACY,
+      "points[%zu]: the distance may be too large by %.2g: a patch is all but equally near in too many "
+      "places; it is degenerate, or move the point",
+      worst.point, worst.miss);
 }
 
 static batten_status check(batten_context *ctx, const batten_network *network, size_t count, const double *points,

@@ -265,6 +265,44 @@ static void test_far_points(batten_context *ctx) {
   shape_free(&s);
 }
 
+/* A patch that has collapsed to a long way to and fro, seen from far off: whole curves of places are equally near to
+ * what rounding tells. The search ends, and says what it may have missed. */
+static void test_degenerate(batten_context *ctx) {
+  enum { DEGREE = 6, POINTS = (DEGREE + 1) * (DEGREE + 2) / 2, FINE = 400 };
+  double net[POINTS][3], vertices[3][3];
+  for (unsigned k = 0, i = 0; k <= DEGREE; k++)
+    for (unsigned j = 0; j + k <= DEGREE; j++, i++)
+      for (int d = 0; d < 3; d++) net[i][d] = sin((d + 1) * 2.0 * (j + k));
+  const size_t corner[3] = {0, DEGREE, POINTS - 1};
+  for (int c = 0; c < 3; c++) memcpy(vertices[c], net[corner[c]], sizeof vertices[c]);
+  const uint32_t triangle[3] = {0, 1, 2};
+  const batten_network_patch patch = {DEGREE, 0, 0, net[0]};
+  batten_network *n = NULL;
+  T_OK(batten_network_create(ctx, 3, vertices[0], 1, triangle, 1, &patch, 0, NULL, &n), ctx);
+  const double points[2][3] = {{0.1, 0.2, 0.1}, {108, 107, -163}};
+  batten_place places[2];
+  double distances[2];
+  batten_status st = batten_network_closest(ctx, n, 2, points[0], places, distances);
+  double told = 0;
+  const char *by = strstr(batten_error(ctx), "too large by ");
+  T_CHECK(st == BATTEN_W_ACCURACY && by && strncmp(batten_error(ctx), "points[1]", 9) == 0, "degenerate: %s (%s)",
+          batten_status_name(st), batten_error(ctx));
+  if (by) told = strtod(by + strlen("too large by "), NULL);
+  T_CHECK(told > 0 && told < 1e-6, "what may be missed is told, and little: %.2g", told);
+  /* All that matters is u + v. */
+  for (int i = 0; i < 2; i++) {
+    double least = INFINITY;
+    for (int f = 0; f <= FINE; f++) {
+      batten_place place = {0, (double)f / FINE, 0};
+      batten_surface_point p;
+      if (batten_network_evaluate(ctx, n, 1, &place, &p) < 0) continue;
+      least = fmin(least, vec_distance(p.point, points[i]));
+    }
+    T_CHECK(distances[i] <= least + told, "as near as %d samples: %.12g", FINE, distances[i]);
+  }
+  batten_network_free(n);
+}
+
 static void test_units(batten_context *ctx, batten_context *three) {
   shape s = shape_torus(4), large = shape_torus(4), turned = shape_torus(4);
   shape_move(&large, false, 0x1p80, (double[3]){0, 0, 0});
@@ -392,6 +430,7 @@ int main(void) {
   test_feet(ctx);
   test_focal_points(ctx);
   test_far_points(ctx);
+  test_degenerate(ctx);
   test_units(ctx, three);
   test_bad(ctx);
   batten_context_free(three);

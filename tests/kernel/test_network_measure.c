@@ -269,6 +269,38 @@ static void test_built(batten_context *ctx) {
   }
 }
 
+/* Where few places are looked at joints may agree by symmetry: that is no certificate. The text tells what to do, and
+ * blames a far origin only for what rounding can do. */
+static void test_certificate(batten_context *ctx) {
+  static const struct {
+    batten_network_fill fill;
+    unsigned samples;
+    double away;
+    const char *text; /* NULL: BATTEN_OK */
+  } cases[] = {{BATTEN_FILL_PN, 2, 0, "check_samples: 2"},   {BATTEN_FILL_SS, 8, 0, "check_samples: 8"},
+               {BATTEN_FILL_SS, 0, 0, "check_samples: 0"},   {BATTEN_FILL_SS, 9, 0, NULL},
+               {BATTEN_FILL_SS, 9, 1e6, "coarse: shift it"}, {BATTEN_FILL_DEGREE7, 1000, 0, NULL},
+               {BATTEN_FILL_PN, 9, 1e6, "between triangles"}};
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    scene_mesh scene = scene_mesh_octahedron();
+    batten_mesh *mesh = NULL;
+    batten_network *n = NULL;
+    batten_network_options opt = batten_network_options_default();
+    opt.fill = cases[i].fill;
+    opt.check_samples = cases[i].samples;
+    for (size_t k = 0; k < 3 * scene.vertices; k++) scene.points[k] += cases[i].away;
+    T_OK(batten_mesh_create(ctx, scene.vertices, scene.points, scene.triangles, scene.corners, &mesh), ctx);
+    batten_status st = batten_network_build(ctx, mesh, &opt, &n, NULL);
+    const char *text = st ? batten_error(ctx) : "exact";
+    T_CHECK(cases[i].text ? st == BATTEN_W_ACCURACY && strstr(text, cases[i].text) : st == BATTEN_OK,
+            "fill %d, %u samples, %g away: %s", (int)cases[i].fill, cases[i].samples, cases[i].away, text);
+    T_CHECK(cases[i].fill != BATTEN_FILL_PN || !strstr(text, "shift it"), "shifting helps rounding only");
+    batten_network_free(n);
+    batten_mesh_free(mesh);
+    scene_mesh_free(&scene);
+  }
+}
+
 /* ---- regularity --------------------------------------------------------------------------------- */
 
 static void fold(const double xy[2], double out[3]) { /* along u = 0.6 */
@@ -397,6 +429,7 @@ int main(void) {
   test_gauss_bonnet_with_boundary(ctx);
   test_units(ctx, three);
   test_built(ctx);
+  test_certificate(ctx);
   test_regularity(ctx);
   test_nothing_to_measure(ctx);
   shape s = shape_graph(2, 2, 3, cap);

@@ -30,7 +30,8 @@ typedef enum batten_network_fill {
   BATTEN_FILL_PETERS,      /* one quintic a facet [after Peters 1991]; not exactly G1: its residual is told */
   BATTEN_FILL_DEGREE7,     /* one patch of degree 7 a facet [section 6], DEGREE6 where that would be singular */
   BATTEN_FILL_DEGREE6,     /* three patches of degree 6 a facet */
-  BATTEN_FILL_PN /* one cubic a facet from estimated normals [Vlachos et al. 2001]: only G0, for comparison */
+  BATTEN_FILL_PN /* one cubic a facet from estimated normals [Vlachos et al. 2001], for comparison: only G0, and with
+                    gaps at creases */
 } batten_network_fill;
 
 typedef enum batten_normal_weights {                           /* of the triangles' normals at a vertex */
@@ -102,8 +103,8 @@ typedef struct batten_network_options {
   double fair_tol;      /* stop when a pass lowers the energy by a smaller part. Default 1e-3. */
   int fair_warm;        /* non-zero: start from the G2 network; 0: from normals alone, safer. Default 0. */
 
-  unsigned check_samples; /* places on each edge where the finished joints are measured, 0 = not at all (the status
-                             is then W_ACCURACY), 2 .. 1000. Default 9. */
+  unsigned check_samples; /* places on each edge where the finished joints are measured, 0 = not at all, 2 .. 1000.
+                             Below 9, which can agree by symmetry, the status is W_ACCURACY. Default 9. */
 } batten_network_options;
 BATTEN_API batten_network_options batten_network_options_default(void);
 
@@ -135,7 +136,7 @@ typedef struct batten_network_info {
  * Progress phases: "topology", "normals", "network", "fair", "fill", "check".
  * BATTEN_OK: every joint across smooth edges and inside facets was measured and normals agree to 1e-9 degrees, gaps
  * are below 1e-12 of the size, and every facet is proven regular. Else BATTEN_W_ACCURACY, and the error text says
- * what was missed (PETERS and PN always).
+ * what was missed (PETERS and PN on all but the simplest meshes).
  * Same bits for any number of threads. Time O(F) for all but the direct solves.
  * Fails: INVALID (options; the mesh, with indices), NOMEM, TOO_LARGE, SINGULAR, CANCELLED. Since 0.2. */
 BATTEN_API batten_status batten_network_build(batten_context *ctx, const batten_mesh *mesh,
@@ -201,7 +202,9 @@ BATTEN_API batten_status batten_network_evaluate(batten_context *ctx, const batt
 
 /* The nearest places to points [count][3]: places [count], distances [count] (may be NULL), caller's unit. Boxes over
  * subdivided control nets, then Newton's method on the patch, its edges and corners: the distance is the least one to
- * 1e-12 of the surface's size. Progress phase "closest". Fails: INVALID, NOMEM, CANCELLED. */
+ * 1e-12 of the surface's size. BATTEN_W_ACCURACY: on degenerate patches that took too long; the text names the point
+ * that is worst off, and by how much its distance may be too large. Progress phase "closest". Fails: INVALID, NOMEM,
+ * CANCELLED. */
 BATTEN_API batten_status batten_network_closest(batten_context *ctx, const batten_network *network, size_t count,
                                                 const double *points, batten_place *places, double *distances);
 
