@@ -22,7 +22,7 @@ enum { COMMANDS = sizeof commands / sizeof commands[0] };
 
 static void print_help(void) {
   printf(
-      "batten %s: smooth solids and surfaces from points, with figures that say how good they are\n\n"
+      "batten %s: smooth solids and surfaces from points and meshes, with figures that say how good they are\n\n"
       "usage: batten COMMAND [OPTIONS] FILE\n\ncommands:\n",
       batten_version());
   for (size_t i = 0; i < COMMANDS; i++) printf("  %-10s %s\n", commands[i].name, commands[i].help);

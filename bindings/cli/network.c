@@ -78,7 +78,7 @@ static const cli_option table[] = {
      "faces in STEP and IGES: trimmed (one parallelogram each), quads (three), or\ndegenerate (a pole); default "
      "trimmed"},
     {"unit", OPT_UNIT, "NAME", "of lengths in STEP and IGES: mm, cm, m or inch; default mm"},
-    {"density", OPT_DENSITY, "N", "segments of each edge in meshes and the picture; default 8"},
+    {"density", OPT_DENSITY, "N", "segments of each edge in meshes; default 8"},
     {"tolerance", OPT_TOLERANCE, "T", "meshes within T of the surface, with at most --density segments"},
     {"color", OPT_COLOR, "WHAT", "picture: gauss, mean, isophotes, reflection or none; default gauss"},
     {"range", OPT_RANGE, "LOW,HIGH", "of the colours; default 2 % to 98 % of the area"},
@@ -99,9 +99,12 @@ static void print_help(void) {
       "usage: batten network MESH [OPTIONS]\n\n"
       "Makes a smooth surface of Bezier triangles through all vertices of a triangle mesh, one facet for each "
       "triangle,\n"
-      "with normals that agree along all edges. MESH: .ply .obj .off .stl, also with .gz.\n\n");
+      "with normals that agree along all edges but those that are to be sharp. MESH: .ply .obj .off .stl, also with "
+      ".gz.\n\n");
   cli_options_print(table);
   printf(
+      "\nusual for scans and exports, in millimetres: mend, take out the noise, thin out, keep edges sharp\n\n"
+      "  batten network scan.stl --repair --smooth 0.05 --faces 4000 --creases 40 -o part.step --picture part.png\n"
       "\nexample: a ball from an octahedron, for CAD, with picture and figures\n\n"
       "  printf 'v %%s\\n' '1 0 0' '0 1 0' '-1 0 0' '0 -1 0' '0 0 1' '0 0 -1' > octahedron.obj\n"
       "  printf 'f %%s\\n' '1 2 5' '2 3 5' '3 4 5' '4 1 5' '2 1 6' '3 2 6' '4 3 6' '1 4 6' >> octahedron.obj\n"

@@ -70,6 +70,7 @@ static void report_prepared(const network_work *w, cli_report *r) {
   cli_report_count(r, "split_vertices", p->repair.split_vertices);
   cli_report_count(r, "removed_vertices", p->repair.removed_vertices);
   cli_report_count(r, "removed_triangles", p->repair.removed_triangles);
+  cli_report_count(r, "swapped_edges", p->repair.swapped_edges);
   cli_report_count(r, "turned_triangles", p->repair.turned_triangles);
   cli_report_number(r, "smooth_lambda", p->smooth_lambda);
   cli_report_number(r, "decimate_distance", p->decimate_distance);

@@ -82,6 +82,18 @@ static void choose_range(const batten_network_measures *m, bool gauss, batten_pi
   }
 }
 
+/* Lines as who looks at the picture would see them: the eye is its camera, and the lights run along its horizon. */
+static void light(const batten_picture_options *o, batten_lines_options *l) {
+  const double degree = 0.017453292519943295769;
+  double azimuth = o->azimuth_deg * degree, elevation = o->elevation_deg * degree;
+  double back[3] = {cos(elevation) * cos(azimuth), cos(elevation) * sin(azimuth), sin(elevation)};
+  double right[3] = {-sin(azimuth), cos(azimuth), 0};
+  for (unsigned k = 0; k < 3; k++) {
+    l->direction[(o->up_axis + 1 + k) % 3] = back[k];
+    l->light_axis[(o->up_axis + 1 + k) % 3] = right[k];
+  }
+}
+
 static batten_status color(const network_work *w, drawing *d, batten_picture_options *o) {
   network_color what = w->request->color;
   batten_status st = BATTEN_OK;
@@ -94,6 +106,7 @@ static batten_status color(const network_work *w, drawing *d, batten_picture_opt
   } else if (what != NETWORK_PLAIN) {
     batten_lines_options l = batten_lines_options_default();
     l.kind = what == NETWORK_ISOPHOTES ? BATTEN_LINES_ISOPHOTE : BATTEN_LINES_REFLECTION;
+    if (l.kind == BATTEN_LINES_REFLECTION) light(o, &l);
     d->lines = batten_alloc_array(w->run.ctx, batten_mesh_vertex_count(d->mesh), sizeof *d->lines);
     st = d->lines ? batten_network_line_values(w->run.ctx, d->mesh, &l, d->lines) : BATTEN_E_NOMEM;
     o->colors = d->lines;
@@ -110,9 +123,11 @@ static double picture_fineness(const network_work *w) {
   return sqrt(pixels / (4 * (double)batten_network_face_count(w->network) + 1));
 }
 
-/* So many segments for each edge that the picture is smooth where facets are large. */
-static unsigned picture_density(double fineness) {
-  return (unsigned)fmin(fmax(fineness / 4, fmax(1, fmin(fineness, 3))), 32);
+/* So many segments for each edge that the picture is smooth where facets are large. Lines of light follow normals,
+ * whose kinks between triangles are seen: they want more. */
+static unsigned picture_density(double fineness, bool lines) {
+  return (unsigned)fmin(fmax(lines ? fineness : fineness / 4, fmax(1, fmin(fineness, lines ? 6 : 3))),
+                        lines ? 64 : 32);
 }
 
 /* Where facets are smaller their boundaries would be all that is seen. */
@@ -124,7 +139,8 @@ batten_status network_draw(const network_work *w, const char *path) {
   batten_picture_options o = w->request->picture;
   batten_tessellate_options t = batten_tessellate_options_default();
   double fineness = picture_fineness(w);
-  t.density = picture_density(fineness);
+  t.density =
+      picture_density(fineness, w->request->color == NETWORK_ISOPHOTES || w->request->color == NETWORK_REFLECTION);
   t.per_patch = 1;
   batten_status st = batten_network_tessellate(ctx, w->network, &t, &d.mesh);
   if (st >= 0) {

@@ -42,14 +42,15 @@ run 2 "x.txt: unknown extension for -o; use .step .iges .json .vtu" network octa
 run 2 "x.svg: unknown extension for --picture; use .png" network octahedron.obj --picture x.svg
 run 2 "not with --repair" network octahedron.obj --repair --lines l.txt
 run 1 "none.off" network none.off -o x.step
-run 1 "made for a G1 network" network octahedron.obj --fill ss --continuity G2 -o x.step
+run 1 "batten: --continuity: 2, but this fill is made for a G1 network; leave it away, or take another --fill" network octahedron.obj --fill ss --continuity G2 -o x.step
 sed 's/^f 1 2 5/f 2 1 5/' octahedron.obj >turned.obj
 run 1 "turned.obj: " network turned.obj -o x.step
 check "which names the remedy of the program: $(cat err)" grep -q -- --repair err
 printf 'OFF\n5 3 0\n0 0 0\n1 0 0\n0 1 0\n0 -1 0\n0 0 1\n3 0 1 2\n3 1 0 3\n3 0 1 4\n' >fin.off
 run 1 "edge" network fin.off -o x.step
 printf '0 9\n' >far.txt
-run 1 "9" network octahedron.obj --crease-edges far.txt -o x.step
+run 1 "--crease-edges[0]: vertices 0 and 9; give the ends of an edge" network octahedron.obj --crease-edges far.txt -o x.step
+run 1 "--lines[1]: no edge from vertex 0 to vertex 9" network octahedron.obj --lines far.txt -o x.step
 printf '0 1\nx 2\n' >word.txt
 run 1 "word.txt:2: 'x' is not the number of a vertex" network octahedron.obj --crease-edges word.txt
 printf '3\n' >alone.txt
