@@ -225,6 +225,13 @@ static void assemble(void *arg, size_t index) {
   for (size_t i = index * ITEMS_PER_TASK; i < task_end(index, job->t->nodes); i++) assemble_node(job, (uint32_t)i);
 }
 
+/* Tangent of the angle between unit vectors, of 90 degrees at most. */
+static double turn_of(const double *from, const double *to) {
+  double across[3];
+  vec_cross(from, to, across);
+  return vec_norm(across) / fmax(vec_dot(from, to), 1e-3);
+}
+
 /* New normals; part: the largest turn asked for. */
 static void turn_normals(void *arg, size_t index) {
   g1_job *job = arg;
@@ -239,6 +246,7 @@ static void turn_normals(void *arg, size_t index) {
     for (int k = 0; k < 3; k++) normal[k] = node->w[k] - scale * (x[0] * node->u[k] + x[1] * node->v[k]);
     vec_normalize(normal);
     net_normal_constrain(t->constraint ? t->constraint + i : NULL, normal);
+    if (net_normal_guard(t, (uint32_t)i, normal)) slope = turn_of(node->w, normal);
     most = fmax(most, slope);
   }
   job->part[index] = atan(most);

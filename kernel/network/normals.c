@@ -11,6 +11,9 @@
 
 enum { NODES_PER_TASK = 2048 };
 
+/* Least product of a normal with those of its triangles: 84 degrees. */
+static const double FRONT_MIN = 0.1;
+
 /* The triangle's normal at a corner with sides a and b, as long as it counts. */
 static void corner_normal(batten_normal_weights weights, const double *a, const double *b, double *out) {
   double aa = vec_dot(a, a), bb = vec_dot(b, b), weight = 0;
@@ -83,6 +86,68 @@ void net_normal_constrain(const net_constraint *c, double normal[3]) {
   }
 }
 
+/* ---- normals that see their triangles ------------------------------------------------------------- */
+
+/* The least product of a vector with the unit normals of the node's triangles; which [3]: that normal. */
+static double frontness(const net_topology *t, uint32_t node, const double *w, double *which) {
+  double least = INFINITY;
+  for (uint32_t h = t->node_first[node]; h != NET_NONE; h = net_fan_next(t, h)) {
+    const uint32_t *v = t->triangles + h / 3 * 3;
+    double n[3];
+    vec_triangle_normal(t->points + (size_t)3 * v[0], t->points + (size_t)3 * v[1], t->points + (size_t)3 * v[2], n);
+    vec_normalize(n);
+    double product = vec_dot(w, n);
+    if (product >= least) continue;
+    least = product;
+    if (which) memcpy(which, n, sizeof n);
+  }
+  return least;
+}
+
+/* The middle of the smallest cap of the unit sphere that holds all normals of the triangles, nearly: to go towards
+ * the farthest by ever smaller steps ends there [Badoiu, Clarkson 2003]. */
+static void most_frontal(const net_topology *t, uint32_t node, const net_constraint *c, double *w) {
+  enum { STEPS = 100 };
+  for (int step = 2; step < STEPS; step++) {
+    double farthest[3], before[3];
+    memcpy(before, w, sizeof before);
+    frontness(t, node, w, farthest);
+    for (int k = 0; k < 3; k++) w[k] += (farthest[k] - w[k]) / step;
+    if (!vec_normalize(w)) memcpy(w, before, sizeof before);
+    net_normal_constrain(c, w);
+  }
+}
+
+bool net_normal_guard(const net_topology *t, uint32_t node, double normal[3]) {
+  const net_constraint *c = t->constraint ? t->constraint + node : NULL;
+  if (c && c->kind == NET_CORNER) return false;
+  double least = frontness(t, node, normal, NULL), center[3], from[3];
+  if (least >= FRONT_MIN) return false;
+  memcpy(from, normal, sizeof from);
+  estimate(t, BATTEN_NORMALS_ANGLE, node, center);
+  net_normal_constrain(c, center);
+  most_frontal(t, node, c, center);
+  double best = frontness(t, node, center, NULL), bound = fmin(FRONT_MIN, 0.5 * best);
+  if (least >= bound || least >= best) return false;
+  /* What is seen grows along the arc from the given normal up to the middle. */
+  double seen = 1, unseen = 0;
+  memcpy(normal, center, 3 * sizeof *normal);
+  for (int step = 0; step < 20 && best > 0; step++) {
+    double w[3], part = 0.5 * (seen + unseen);
+    for (int k = 0; k < 3; k++) w[k] = (1 - part) * from[k] + part * center[k];
+    if (vec_normalize(w) && frontness(t, node, w, NULL) >= bound) {
+      seen = part;
+      memcpy(normal, w, sizeof w);
+    } else {
+      unseen = part;
+    }
+  }
+  net_normal_constrain(c, normal);
+  return true;
+}
+
+/* ---- all nodes ------------------------------------------------------------------------------------ */
+
 typedef struct normals_job {
   const net_topology *t;
   batten_normal_weights weights;
@@ -104,6 +169,7 @@ static void estimate_nodes(void *arg, size_t index) {
     }
     estimate(t, job->weights, (uint32_t)i, normal);
     net_normal_constrain(c, normal);
+    net_normal_guard(t, (uint32_t)i, normal);
   }
 }
 
