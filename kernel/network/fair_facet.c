@@ -49,16 +49,14 @@ void fair_facet_axes(const fair_tables *tables, const fair_net net, double (*axe
 typedef struct fair_side {
   unsigned from, to; /* corners */
   bool reversed;     /* the run is against the facet's */
-  batten_network_direction direction;
+  uint32_t edge;
+  bool turned;     /* the run is against half[edge]: at creases */
   bool follows[2]; /* t follows the normals at this end: not where a crease has its own tangent */
   const double *vi, *vj, *bend_i, *bend_j;
-  bool guided;
-  double guide[2][3];
   net_local local;
 } fair_side;
 
-static void side_make(const net_topology *t, const batten_network_options *opt, const net_local *local, size_t face,
-                      unsigned k, fair_side *out) {
+static void side_make(const net_topology *t, const net_local *local, size_t face, unsigned k, fair_side *out) {
   uint32_t h = (uint32_t)(3 * face + k), e = t->edge[h];
   bool crease = t->kind[e] == NET_CREASE;
   uint32_t run = crease ? h : t->half[e];
@@ -66,43 +64,41 @@ static void side_make(const net_topology *t, const batten_network_options *opt, 
   out->reversed = run != h;
   out->from = out->reversed ? (k + 1) % 3 : k;
   out->to = out->reversed ? k : (k + 1) % 3;
-  out->direction = crease ? BATTEN_DIRECTION_D1 : opt->direction;
+  out->edge = e;
+  out->turned = turned;
   out->vi = t->points + 3 * (size_t)t->triangles[run];
   out->vj = t->points + 3 * (size_t)t->triangles[net_next(run)];
   out->bend_i = net_edge_bend(t, e, turned);
   out->bend_j = net_edge_bend(t, e, !turned);
-  out->guided = t->guide != NULL;
   for (unsigned end = 0; end < 2; end++) {
     unsigned from = turned ? !end : end;
     uint32_t node = t->node[end ? net_next(run) : run];
     out->follows[end] = !crease || !t->constraint || t->constraint[node].kind == NET_FREE;
     memcpy(out->local.t[end], local[e].t[from], sizeof out->local.t[end]);
     memcpy(out->local.s[end], local[e].s[from], sizeof out->local.s[end]);
-    if (out->guided) memcpy(out->guide[end], t->guide + 3 * (2 * (size_t)e + from), sizeof out->guide[end]);
   }
 }
 
 /* The ribbon for other nodes than those for which `local` was made. Where directions are by a substitute they stand
  * still: so rare that a step that is not the best will do. */
-static void side_ribbon(const batten_network_options *opt, const fair_side *side, const net_node *corner, bool linear,
-                        net_ribbon *out) {
+static void side_ribbon(const net_topology *t, const batten_network_options *opt, const fair_side *side,
+                        const net_node *corner, bool linear, net_ribbon *out) {
   const net_node *i = &corner[side->from], *j = &corner[side->to];
   net_local local = side->local, moved;
   if (!linear) {
-    double chord[3];
-    vec_sub(side->vj, side->vi, chord);
-    bool substitute = net_tangent(side->direction, opt->length, chord, i->w, j->w, side->guided ? side->guide : NULL,
-                                  NULL, NULL, &moved);
+    const net_node *ends[2] = {side->turned ? j : i, side->turned ? i : j};
+    bool substitute = net_tangent_between(t, opt, ends, NULL, side->edge, &moved);
     for (int end = 0; end < 2; end++)
-      if (!substitute && side->follows[end]) memcpy(local.t[end], moved.t[end], sizeof local.t[end]);
+      if (!substitute && side->follows[end])
+        memcpy(local.t[end], moved.t[side->turned ? !end : end], sizeof local.t[end]);
   }
   net_ribbon_join(side->vi, side->vj, i, j, &local, side->bend_i, side->bend_j, out);
   if (side->reversed) net_ribbon_reverse(out, out);
 }
 
 /* Control points that nodes and ribbons determine, after a step at one corner. */
-static void moved(const batten_network_options *opt, const fair_side *side, const fair_facet *facet, unsigned corner,
-                  const double step[5], bool linear, double (*points)[3]) {
+static void moved(const net_topology *t, const batten_network_options *opt, const fair_side *side,
+                  const fair_facet *facet, unsigned corner, const double step[5], bool linear, double (*points)[3]) {
   net_node node[3];
   net_ribbon ribbon[3];
   memcpy(node, facet->corner, sizeof node);
@@ -111,8 +107,8 @@ static void moved(const batten_network_options *opt, const fair_side *side, cons
     for (int k = 0; k < 5; k++) node[corner].x[k] += step[k];
   else
     fair_node_turn(&facet->corner[corner], step, &node[corner]);
-  side_ribbon(opt, &side[corner], node, linear, &ribbon[corner]);
-  side_ribbon(opt, &side[(corner + 2) % 3], node, linear, &ribbon[(corner + 2) % 3]);
+  side_ribbon(t, opt, &side[corner], node, linear, &ribbon[corner]);
+  side_ribbon(t, opt, &side[(corner + 2) % 3], node, linear, &ribbon[(corner + 2) % 3]);
   net_degree7_frame(node, ribbon, points, NULL);
 }
 
@@ -136,7 +132,7 @@ void fair_facet_slopes(const net_topology *t, const batten_network_options *opt,
   fair_side side[3];
   double ahead[FAIR_NET][3] = {{0}}, behind[FAIR_NET][3] = {{0}}, base[FAIR_NET][3] = {{0}}, length = 0;
   for (unsigned k = 0; k < 3; k++) {
-    side_make(t, opt, local, face, k, &side[k]);
+    side_make(t, local, face, k, &side[k]);
     length += vec_distance(side[k].vi, side[k].vj) / 3;
   }
   memset(slopes, 0, sizeof(fair_slopes));
@@ -145,11 +141,11 @@ void fair_facet_slopes(const net_topology *t, const batten_network_options *opt,
     unsigned which = column % 5;
     double step[5] = {0}, reach = which < 2 && !linear ? TURN_STEP : which < 2 ? 1 : 1 / length, scale = 1 / reach;
     step[which] = reach;
-    moved(opt, side, facet, column / 5, step, linear, ahead);
+    moved(t, opt, side, facet, column / 5, step, linear, ahead);
     const double(*from)[3] = (const double(*)[3])base;
     if (which < 2 && !linear) {
       step[which] = -reach;
-      moved(opt, side, facet, column / 5, step, linear, behind);
+      moved(t, opt, side, facet, column / 5, step, linear, behind);
       from = (const double(*)[3])behind;
       scale = 0.5 / reach;
     }

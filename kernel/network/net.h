@@ -136,9 +136,13 @@ bool net_tangent(batten_network_direction direction, batten_network_length lengt
                  const double normal_i[3], const double normal_j[3], const double (*guide)[3],
                  const double *curvature, const double (*fallback)[3], net_local *out);
 /* The same for edge e of a network with these frames (and forms [nodes][3] for L3, L4, else NULL), on its left or
- * right side; creases have the same t on both sides. */
+ * right side; creases have the same t on both sides. Tangents of smooth edges keep to a share of the angles between
+ * the projections of their neighbours, so that they are in the order of the edges where those are. */
 bool net_tangent_edge(const net_topology *t, const batten_network_options *opt, const net_node *nodes,
                       const double *forms, uint32_t e, net_local *out);
+/* ... with the nodes at the start and the end of half[e], and their forms [2] or NULL. */
+bool net_tangent_between(const net_topology *t, const batten_network_options *opt, const net_node *const ends[2],
+                         const double *const *forms, uint32_t e, net_local *out);
 
 /* ---- G1: cubics ----------------------------------------------------------------------------------- */
 

@@ -16,6 +16,10 @@ static const double DIRECTION_MIN = 1e-6;
 /* An arc turns by twice this at most: longer ones would be loops. */
 static const double ARC_ANGLE_MAX = 2.6;
 
+/* Of the angle between projected edges that a tangent may use up: two of them leave a fifth. */
+static const double ORDER_SHARE = 0.4;
+static const double PI = 3.14159265358979323846;
+
 /* Unit vector of the part of a that is orthogonal to the unit normal w. */
 static bool project(const double *a, const double *w, double *out) {
   double part = vec_dot(a, w), length = vec_norm(a);
@@ -133,15 +137,15 @@ bool net_tangent(batten_network_direction direction, batten_network_length lengt
 /* ---- edges of a network --------------------------------------------------------------------------- */
 
 /* Between the other sides of the triangles at the edge's end, projected: for edges that stand upright there. */
-static void upright_fallback(const net_topology *t, const net_node *nodes, uint32_t e, double (*out)[3]) {
+static void upright_fallback(const net_topology *t, const net_node *const ends[2], uint32_t e, double (*out)[3]) {
   memset(out, 0, 2 * sizeof *out);
   for (unsigned end = 0; end < 2; end++) {
-    uint32_t h = t->half[e], node = net_edge_node(t, e, end, 0);
+    uint32_t h = t->half[e];
     const double *p = t->points + (size_t)3 * t->triangles[end ? net_next(h) : h];
     for (int side = 0; side < 2 && h != NET_NONE; side++, h = t->twin[h]) {
       double a[3], d[3];
       vec_sub(t->points + (size_t)3 * t->triangles[net_prev(h)], p, a);
-      if (project(a, nodes[node].w, d))
+      if (project(a, ends[end]->w, d))
         for (int k = 0; k < 3; k++) out[end][k] += d[k];
     }
   }
@@ -149,8 +153,8 @@ static void upright_fallback(const net_topology *t, const net_node *nodes, uint3
 
 /* Derivatives of a crease are the same on both sides: directions are those of the crease, where it has some, else
  * the projected edge at an end where both sides have one plane; nothing is asked of the other planes. */
-static bool crease_tangent(const net_topology *t, batten_network_length length, const net_node *nodes, uint32_t e,
-                           const double *chord, const double (*guide)[3], const double (*fallback)[3],
+static bool crease_tangent(const net_topology *t, batten_network_length length, const net_node *const ends[2],
+                           uint32_t e, const double *chord, const double (*guide)[3], const double (*fallback)[3],
                            net_local *out) {
   double back[3] = {-chord[0], -chord[1], -chord[2]};
   const double *chords[2] = {chord, back};
@@ -161,7 +165,7 @@ static bool crease_tangent(const net_topology *t, batten_network_length length, 
     double d[3] = {0};
     if (guide) memcpy(d, guide[end], sizeof d);
     if (!t->constraint || t->constraint[node].kind == NET_FREE || !vec_normalize(d))
-      exact &= direction_at(chords[end], nodes[node].w, guide ? guide[end] : NULL, NULL,
+      exact &= direction_at(chords[end], ends[end]->w, guide ? guide[end] : NULL, NULL,
                             fallback ? fallback[end] : NULL, d);
     double size = length == BATTEN_LENGTH_L1 ? vec_norm(chord) : arc_length(d, chords[end]);
     for (int k = 0; k < 3; k++) out->t[end][k] = size * d[k];
@@ -174,37 +178,111 @@ static double form_value(const net_node *node, const double *form, const double 
   return (form[0] * a * a + 2 * form[1] * a * b + form[2] * b * b) / (a * a + b * b);
 }
 
-bool net_tangent_edge(const net_topology *t, const batten_network_options *opt, const net_node *nodes,
-                      const double *forms, uint32_t e, net_local *out) {
+/* ---- order around a node -------------------------------------------------------------------------- */
+
+/* Angle from a to b about w, both of which are orthogonal to it. */
+static double angle_about(const double *w, const double *a, const double *b) {
+  double across[3];
+  vec_cross(a, b, across);
+  return atan2(vec_dot(w, across), vec_dot(a, b));
+}
+
+/* Angle from d, the projected edge, to the projection of the edge from the same node to the vertex at `corner`, about
+ * w or, turn -1, against it; pi when there is none. */
+static double gap(const net_topology *t, const double *p, const double *w, const double *d, double turn,
+                  uint32_t corner) {
+  double a[3], b[3];
+  if (corner == NET_NONE) return PI;
+  vec_sub(t->points + (size_t)3 * t->triangles[corner], p, a);
+  return project(a, w, b) ? turn * angle_about(w, d, b) : 0;
+}
+
+/* The plane of D2 turns a tangent away from its projected edge, where normals differ much by more than the angle to
+ * the next edge: the facet between them would turn over. Each keeps to its share of that angle. True when d [3] was
+ * changed. */
+static bool hold_order(const net_topology *t, const double *w, uint32_t e, unsigned end, const double *chord,
+                       double *d) {
+  uint32_t h = t->half[e], twin = t->twin[h];
+  const double *p = t->points + (size_t)3 * t->triangles[end ? net_next(h) : h];
+  uint32_t left = net_prev(h), right = twin == NET_NONE ? NET_NONE : net_prev(twin);
+  double middle[3], v[3];
+  if (!project(chord, w, middle)) return false;
+  double turn = angle_about(w, middle, d);
+  double sign = turn > 0 ? 1 : -1;
+  double limit = ORDER_SHARE * fmax(gap(t, p, w, middle, sign, (sign > 0) != end ? left : right), 0);
+  if (fabs(turn) <= limit) return false;
+  vec_cross(w, middle, v);
+  double angle = sign * limit, size = vec_norm(d);
+  for (int k = 0; k < 3; k++) d[k] = size * (cos(angle) * middle[k] + sin(angle) * v[k]);
+  return true;
+}
+
+/* Guides that keep the tangents of out in order; false when they are so already. */
+static bool order_guides(const net_topology *t, const net_node *const ends[2], uint32_t e, const double *chord,
+                         const double (*guide)[3], const net_local *out, double (*guides)[3]) {
+  bool held = false;
+  double back[3] = {-chord[0], -chord[1], -chord[2]};
+  memset(guides, 0, 2 * sizeof *guides);
+  for (unsigned end = 0; end < 2; end++) {
+    if (guide && vec_dot(guide[end], guide[end]) > 0) {
+      memcpy(guides[end], guide[end], sizeof guides[end]);
+      continue;
+    }
+    double d[3];
+    memcpy(d, out->t[end], sizeof d);
+    if (!hold_order(t, ends[end]->w, e, end, end ? back : chord, d)) continue;
+    memcpy(guides[end], d, sizeof d);
+    held = true;
+  }
+  return held;
+}
+
+/* Of a smooth edge; forms as below. */
+static bool smooth_tangent(const net_topology *t, const batten_network_options *opt, batten_network_length length,
+                           const net_node *const ends[2], const double *const *forms, uint32_t e, const double *chord,
+                           const double (*guide)[3], const double (*upright)[3], net_local *out) {
+  const double *wi = ends[0]->w, *wj = ends[1]->w;
+  double held[2][3], curvature[2];
+  bool substitute = net_tangent(opt->direction, forms ? BATTEN_LENGTH_L1 : length, chord, wi, wj, guide, NULL,
+                                upright, out); /* directions are the same for all lengths */
+  bool turned = opt->direction == BATTEN_DIRECTION_D2 && order_guides(t, ends, e, chord, guide, out, held);
+  if (!turned && !forms) return substitute;
+  for (int end = 0; forms && end < 2; end++)
+    curvature[end] = form_value(ends[end], forms[end], turned ? held[end] : out->t[end]);
+  return net_tangent(opt->direction, length, chord, wi, wj, turned ? (const double(*)[3])held : guide,
+                     forms ? curvature : NULL, upright, out);
+}
+
+bool net_tangent_between(const net_topology *t, const batten_network_options *opt, const net_node *const ends[2],
+                         const double *const *forms, uint32_t e, net_local *out) {
   static const double none[6] = {0};
-  uint32_t h = t->half[e], i = net_edge_node(t, e, 0, 0), j = net_edge_node(t, e, 1, 0);
+  uint32_t h = t->half[e];
   const double(*guide)[3] = t->guide ? (const double(*)[3])(t->guide + (size_t)6 * e) : NULL;
-  const double *wi = nodes[i].w, *wj = nodes[j].w;
   bool bent = t->bend && memcmp(t->bend + (size_t)6 * e, none, sizeof none) != 0;
   bool crease = t->kind[e] == NET_CREASE;
   batten_network_length length = opt->length;
-  double chord[3], curvature[2], fallback[2][3];
+  double chord[3], fallback[2][3];
   vec_sub(t->points + (size_t)3 * t->triangles[net_next(h)], t->points + (size_t)3 * t->triangles[h], chord);
-  bool curved = forms && !bent && !crease && (length == BATTEN_LENGTH_L3 || length == BATTEN_LENGTH_L4);
-  if (!curved && length != BATTEN_LENGTH_L1) length = BATTEN_LENGTH_L2;
+  if (bent || (length != BATTEN_LENGTH_L3 && length != BATTEN_LENGTH_L4)) forms = NULL;
+  if (!forms && length != BATTEN_LENGTH_L1) length = BATTEN_LENGTH_L2;
 
   const double(*upright)[3] = NULL;
   bool substitute = false;
   for (int attempt = 0; attempt < 2 && (attempt == 0 || substitute); attempt++) {
     if (attempt) {
-      upright_fallback(t, nodes, e, fallback);
+      upright_fallback(t, ends, e, fallback);
       upright = (const double(*)[3])fallback;
     }
-    if (crease) {
-      substitute = crease_tangent(t, length, nodes, e, chord, guide, upright, out);
-      continue;
-    }
-    if (curved) {
-      net_tangent(opt->direction, BATTEN_LENGTH_L1, chord, wi, wj, guide, NULL, upright, out);
-      curvature[0] = form_value(&nodes[i], forms + (size_t)3 * i, out->t[0]);
-      curvature[1] = form_value(&nodes[j], forms + (size_t)3 * j, out->t[1]);
-    }
-    substitute = net_tangent(opt->direction, length, chord, wi, wj, guide, curved ? curvature : NULL, upright, out);
+    substitute = crease ? crease_tangent(t, length, ends, e, chord, guide, upright, out)
+                        : smooth_tangent(t, opt, length, ends, forms, e, chord, guide, upright, out);
   }
   return substitute;
+}
+
+bool net_tangent_edge(const net_topology *t, const batten_network_options *opt, const net_node *nodes,
+                      const double *forms, uint32_t e, net_local *out) {
+  uint32_t i = net_edge_node(t, e, 0, 0), j = net_edge_node(t, e, 1, 0);
+  const net_node *ends[2] = {nodes + i, nodes + j};
+  const double *both[2] = {forms ? forms + (size_t)3 * i : NULL, forms ? forms + (size_t)3 * j : NULL};
+  return net_tangent_between(t, opt, ends, forms ? both : NULL, e, out);
 }
