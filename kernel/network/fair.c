@@ -9,9 +9,10 @@
  * sparse Cholesky; a step, after which frames turn with their normals.
  *
  * A step is taken when the energy falls and no more facets are irregular than before. Otherwise damping grows:
- * around the facets that would turn irregular, or everywhere. So nothing that comes out is worse than the start.
- * Facets that are next to singular, as rough scans have them from the start, count by the logarithm of their energy,
- * and by as much in the equations: a few that cannot be mended do not hold up all others.
+ * around the facets that would turn irregular or that alone make the energy rise, or everywhere. So nothing that
+ * comes out is worse than the start. Facets that are next to singular, as rough scans have them from the start, count
+ * by the logarithm of their energy, and by as much in the equations: a few that cannot be mended do not hold up all
+ * others.
  *
  * The linear variant freezes normal, connection and metric of the last pass and the tangents' directions, so that the
  * map from unknowns to control points is affine and the rows are linear: a quadratic functional like the paper's, but
@@ -24,12 +25,15 @@
 enum {
   ITEMS_PER_PART = 4, /* facets at some 20 us at least */
   TRIALS_MAX = 12,    /* of damping in a pass */
+  TURNED = 3,         /* irregular facets that weigh as much as a corner that is turned over */
   LINEAR_PASSES = 2
 };
 
 static const double DAMPING_MIN = 1e-6, DAMPING_FIRST = 1e-3, DAMPING_FACTOR = 5, DAMPING_FALL = 25;
 /* Added around facets that would turn irregular: shortens their step to a few parts in a hundred in four trials. */
 static const double GUARD_FIRST = 0.3, GUARD_FACTOR = 10;
+/* Facets that rise by more than this part of the largest rise are damped by themselves. */
+static const double RISE_SHARE = 0.1;
 /* A facet counts as irregular where the degree 7 fill would refuse it, and when the area of the parameters, turned to
  * the corners' normals, falls below this part of its mean. */
 static const double REGULAR_MIN = 0.02;
@@ -48,7 +52,7 @@ typedef struct fair_state {
   net_local *local;
   double (*inner)[3][3];    /* [faces] displacements */
   double *energy;           /* [faces] */
-  unsigned char *irregular; /* [faces] */
+  unsigned char *irregular; /* [faces] 0: regular */
   double counted;           /* sum of energies as they count */
   size_t irregular_count;
 } fair_state;
@@ -115,6 +119,19 @@ static void make_tangents(fair_job *job, fair_scratch *scratch, size_t edge) {
   net_tangent_edge(job->t, &job->opt, job->next.nodes, NULL, (uint32_t)edge, &job->next.local[edge]);
 }
 
+/* Corners at which the facet lies with its back up: tangents of its sides there in the wrong order. */
+static unsigned turned_corners(const fair_facet *facet) {
+  unsigned count = 0;
+  for (unsigned k = 0; k < 3; k++) {
+    double leave[3], arrive[3], up[3];
+    vec_sub(facet->ribbon[k].c[1], facet->ribbon[k].c[0], leave);
+    vec_sub(facet->ribbon[(k + 2) % 3].c[4], facet->ribbon[k].c[0], arrive);
+    vec_cross(leave, arrive, up);
+    if (!(vec_dot(up, facet->corner[k].w) > 0)) count++;
+  }
+  return count;
+}
+
 static void measure_face(fair_job *job, fair_scratch *scratch, size_t face) {
   fair_state *s = &job->next;
   fair_facet facet;
@@ -133,7 +150,8 @@ static void measure_face(fair_job *job, fair_scratch *scratch, size_t face) {
     mean += upward / FAIR_POINTS;
   }
   s->energy[face] = energy <= ENERGY_MAX ? energy : ENERGY_MAX;
-  s->irregular[face] = !(regular && energy <= ENERGY_MAX && least > REGULAR_MIN * fabs(mean));
+  bool fine = regular && energy <= ENERGY_MAX && least > REGULAR_MIN * fabs(mean);
+  s->irregular[face] = (unsigned char)(!fine + TURNED * turned_corners(&facet));
 }
 
 /* Of job->next, from its nodes and displacements. */
@@ -170,11 +188,13 @@ static void energy_scales(const fair_job *job, double *rounding, double *visible
   for (size_t f = 0; f < t->faces; f++) {
     double area = double_area(t, f), r = ROUNDING / (area * sqrt(area));
     *rounding += area * r * r;
+    double bent = 0;
     for (unsigned k = 0; k < 3; k++) {
       const double *x = job->now.nodes[t->node[3 * f + k]].x;
       double square = x[2] * x[2] + 2 * x[3] * x[3] + x[4] * x[4];
-      *visible += area / 6 * square * square;
+      bent += area / 6 * square * square;
     }
+    *visible += fmin(bent, job->cap[f]);
   }
   *visible *= VISIBLE;
 }
@@ -259,15 +279,40 @@ static batten_status try_step(fair_job *job) {
   return BATTEN_OK;
 }
 
-/* More damping around the facets that have turned irregular. */
-static void raise_guard(fair_job *job) {
-  for (size_t f = 0; f < job->t->faces; f++) {
-    if (!job->next.irregular[f] || job->now.irregular[f]) continue;
-    for (unsigned k = 0; k < 3; k++) {
-      double *guard = &job->guard[job->t->node[3 * f + k]];
-      *guard = fmax(GUARD_FIRST, fmin(*guard * GUARD_FACTOR, GUARD_FIRST * 1e9));
-    }
+static void raise_guard(fair_job *job, size_t face) {
+  for (unsigned k = 0; k < 3; k++) {
+    double *guard = &job->guard[job->t->node[3 * face + k]];
+    *guard = fmax(GUARD_FIRST, fmin(*guard * GUARD_FACTOR, GUARD_FIRST * 1e9));
   }
+}
+
+/* More damping around the facets that have turned irregular. */
+static void guard_irregular(fair_job *job) {
+  for (size_t f = 0; f < job->t->faces; f++)
+    if (job->next.irregular[f] > job->now.irregular[f]) raise_guard(job, f);
+}
+
+static double rise(const fair_job *job, size_t face) {
+  return counted(job->next.energy[face], job->cap[face]) - counted(job->now.energy[face], job->cap[face]);
+}
+
+static double rises(const fair_job *job) {
+  double sum = 0;
+  for (size_t f = 0; f < job->t->faces; f++) sum += fmax(rise(job, f), 0);
+  return sum;
+}
+
+/* More damping around the few facets without which the sum would not rise, if there are such: next to singular they
+ * rise whatever the step, and must not hold up all others. */
+static bool guard_risen(fair_job *job) {
+  double sum = job->next.counted - job->now.counted, most = 0, share = 0;
+  for (size_t f = 0; f < job->t->faces; f++) most = fmax(most, rise(job, f));
+  for (size_t f = 0; f < job->t->faces; f++)
+    if (rise(job, f) > RISE_SHARE * most) share += rise(job, f);
+  if (!(share > sum)) return false;
+  for (size_t f = 0; f < job->t->faces; f++)
+    if (rise(job, f) > RISE_SHARE * most) raise_guard(job, f);
+  return true;
 }
 
 /* What the steps make smaller: energies as they count, with those of the ties as they are in this pass. */
@@ -284,13 +329,14 @@ static batten_status pass(fair_job *job, bool *lower) {
   *lower = false;
   run(job, job->t->nodes, make_freedom);
   run(job, job->t->faces, make_equations);
-  for (size_t i = 0; i < job->t->nodes; i++) job->guard[i] = job->guard[i] > GUARD_FIRST ? job->guard[i] / 100 : 0;
+  for (size_t i = 0; i < job->t->nodes; i++)
+    job->guard[i] = job->guard[i] > GUARD_FIRST ? job->guard[i] / GUARD_FACTOR : 0;
   for (unsigned trial = 0; trial < TRIALS_MAX; trial++) {
     batten_status st = try_step(job);
     if (st < 0 && st != BATTEN_E_SINGULAR) return st;
     bool falls = st >= 0 && merit(job, &job->next) < merit(job, &job->now);
     if (falls && job->next.counted >= job->now.counted) { /* only the ties gain */
-      if (job->next.counted < (1 + LITTLE) * job->now.counted) break;
+      if (rises(job) < LITTLE * job->now.counted) break;
       falls = false;
     }
     *lower = falls && job->next.irregular_count <= job->now.irregular_count;
@@ -302,12 +348,11 @@ static batten_status pass(fair_job *job, bool *lower) {
     if (!falls && job->model == FAIR_FROZEN) { /* no matter how short, its step may not be one down */
       job->model = FAIR_FULL;
       run(job, job->t->faces, make_equations);
-    } else if (!falls) {
+    } else if (!falls && !(st >= 0 && trial % 2 && guard_risen(job))) {
       job->damping = fmax(DAMPING_FIRST, DAMPING_FACTOR * job->damping);
       grown = true;
-    } else {
-      raise_guard(job);
     }
+    if (st >= 0) guard_irregular(job);
   }
   return BATTEN_OK;
 }
