@@ -319,6 +319,8 @@ static batten_status prepare(network_work *w) {
     o.weld_radius = q->weld;
     st = batten_mesh_repair(ctx, w->mesh, &o, &made, &w->prepared.repair);
     if (st >= 0) replace_mesh(w, made);
+    if (st >= 0 && batten_mesh_triangle_count(w->mesh) == 0)
+      st = batten_fail(ctx, BATTEN_E_INVALID, "mesh: none of its triangles is left by the repair; give less --weld");
   }
   if (st >= 0 && q->smooth > 0) {
     st = batten_mesh_smooth(ctx, w->mesh, q->smooth, &made, &w->prepared.smooth_lambda);

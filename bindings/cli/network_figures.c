@@ -119,9 +119,13 @@ void network_report(const network_work *w, cli_report *r) {
 void network_print_measures(const batten_network_measures *m, const batten_network_continuity *c) {
   cli_line("topology", "%zu component%s, %s, Euler number %ld", m->components, m->components == 1 ? "" : "s",
            m->closed ? "closed" : "open", m->euler);
-  cli_line("joints", "normals differ by %.1e degrees at most (rms %.1e), sides by %.1e",
-           fmax(c->smooth.normal_max_deg, c->inner.samples ? c->inner.normal_max_deg : 0), c->smooth.normal_rms_deg,
-           fmax(c->smooth.gap_max, c->inner.gap_max));
+  double gap = fmax(fmax(fmax(c->smooth.gap_max, c->inner.gap_max), c->crease.gap_max), c->corner_gap_max);
+  if (c->smooth.samples || c->inner.samples)
+    cli_line("joints", "normals differ by %.1e degrees at most (rms %.1e), sides by %.1e",
+             fmax(c->smooth.normal_max_deg, c->inner.samples ? c->inner.normal_max_deg : 0), c->smooth.normal_rms_deg,
+             gap);
+  else
+    cli_line("joints", "none is smooth, sides differ by %.1e", gap);
   if (c->crease.edges)
     cli_line("creases", "%zu edges of up to %.1f degrees", c->crease.edges, c->crease.normal_max_deg);
   cli_line("curvature", "Gaussian %.4g .. %.4g, 2 %% to 98 %% of the area %.4g .. %.4g; jumps by %.3g at most",

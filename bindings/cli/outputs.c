@@ -109,10 +109,22 @@ static bool stage(cli_output *f, size_t index) {
   return ok;
 }
 
-static bool same_file(const char *a, const char *b) {
+static bool same_place(const char *a, const char *b) {
   struct stat x, y;
-  if (strcmp(a, b) == 0) return true;
   return stat(a, &x) == 0 && stat(b, &y) == 0 && x.st_dev == y.st_dev && x.st_ino == y.st_ino;
+}
+
+/* Also of files that are still to be: the same name in the same folder. */
+static bool same_file(const char *a, const char *b) {
+  if (strcmp(a, b) == 0 || same_place(a, b)) return true;
+  const char *slash_a = strrchr(a, '/'), *slash_b = strrchr(b, '/');
+  if (strcmp(slash_a ? slash_a + 1 : a, slash_b ? slash_b + 1 : b) != 0) return false;
+  char *folder_a = slash_a ? copy_text(a, (size_t)(slash_a - a) + 1) : copy_text(".", 1);
+  char *folder_b = slash_b ? copy_text(b, (size_t)(slash_b - b) + 1) : copy_text(".", 1);
+  bool same = folder_a && folder_b && same_place(folder_a, folder_b);
+  free(folder_a);
+  free(folder_b);
+  return same;
 }
 
 /* Kinds whose extensions do not depend on the data. */

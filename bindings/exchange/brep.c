@@ -345,7 +345,7 @@ static void measure_box(bx_brep *b) {
     upper[i % 3] = fmax(upper[i % 3], x[i]);
     b->reach = fmax(b->reach, fabs(x[i]));
   }
-  b->size = distance(lower, upper);
+  b->size = hypot(hypot(upper[0] - lower[0], upper[1] - lower[1]), upper[2] - lower[2]);
 }
 
 batten_status bx_brep_make(batten_context *ctx, const batten_network *network, bx_brep *out) {

@@ -62,6 +62,16 @@ static void base_name(const char *path, char *out, size_t room) {
   out[length] = '\0';
 }
 
+/* CAD systems take places that are nearer than 1e-7 mm for one; what has so small faces does not come back. */
+static batten_status check_size(batten_context *ctx, const bx_brep *brep, batten_length_unit unit) {
+  static const double millimetres[] = {1, 10, 1000, 25.4};
+  double size = brep->size * millimetres[unit], least = 1e-5;
+  if (size >= least && isfinite(size)) return BATTEN_OK;
+  return batten_fail(ctx, BATTEN_E_INVALID,
+                     "network: its size is %g mm; CAD files need %g mm at least: scale it or choose another unit",
+                     size, least);
+}
+
 static batten_status write_cad(batten_context *ctx, const batten_network *network,
                                const batten_write_network_options *o, bx_format format, const char *path) {
   char name[256];
@@ -75,7 +85,8 @@ static batten_status write_cad(batten_context *ctx, const batten_network *networ
   base_name(path, name, sizeof name);
   batten_status st = bx_brep_make(ctx, network, &brep);
   if (st != BATTEN_OK) return st;
-  st = bx_create(&w, ctx, path);
+  st = check_size(ctx, &brep, o->unit);
+  if (st == BATTEN_OK) st = bx_create(&w, ctx, path);
   if (st == BATTEN_OK) {
     if (format == BX_STEP)
       bx_write_step(&w, &brep, &product);

@@ -16,8 +16,9 @@
 
 enum { FACES_PER_TASK = 256 };
 
-static const double JUMP_TOLERANCE_DEG = 1e-9; /* what counts as exact G1 */
-static const double GAP_TOLERANCE = 1e-12;     /* of the size */
+static const double JUMP_TOLERANCE_DEG = 1e-9;                  /* what counts as exact G1 */
+static const double SIZE_SMALLEST = 1e-70, SIZE_LARGEST = 1e70; /* powers to the 4th occur in measures */
+static const double GAP_TOLERANCE = 1e-12;                      /* of the size */
 /* Two or three places can agree by symmetry alone: PN triangles at the ends and the middle of an edge. */
 enum { SAMPLES_LEAST = 9 };
 
@@ -52,9 +53,10 @@ static batten_status scale_points(net_work *w) {
     w->center[k] = count ? 0.5 * lower[k] + 0.5 * upper[k] : 0;
     w->size = fmax(w->size, count ? upper[k] - lower[k] : 0);
   }
-  if (isinf(w->size) || (count && !(w->size > 0)))
-    return batten_fail(w->ctx, BATTEN_E_INVALID, "vertices: their box has the size %g; scale or check the mesh",
-                       w->size);
+  if (count && !(w->size >= SIZE_SMALLEST && w->size <= SIZE_LARGEST))
+    return batten_fail(w->ctx, BATTEN_E_INVALID,
+                       "vertices: their box has the size %g; must be %g .. %g: scale the mesh", w->size,
+                       SIZE_SMALLEST, SIZE_LARGEST);
   w->scale = count ? batten_unit(w->size) : 1;
   w->points = batten_alloc_array(w->ctx, count, 3 * sizeof *w->points);
   if (!w->points) return BATTEN_E_NOMEM;

@@ -40,9 +40,11 @@ run 2 "--weight-power: '7'" network octahedron.obj --weight-power 7
 run 2 "--range: '2,1': the first must be below the second" network octahedron.obj --range 2,1
 run 2 "x.txt: unknown extension for -o; use .step .iges .json .vtu" network octahedron.obj -o x.txt
 run 2 "x.svg: unknown extension for --picture; use .png" network octahedron.obj --picture x.svg
+run 2 "./x.step: is named as output twice" network octahedron.obj -o x.step -o ./x.step
 run 2 "not with --repair" network octahedron.obj --repair --lines l.txt
 run 1 "none.off" network none.off -o x.step
 run 1 "batten: --continuity: 2, but this fill is made for a G1 network; leave it away, or take another --fill" network octahedron.obj --fill ss --continuity G2 -o x.step
+run 1 "none of its triangles is left by the repair" network octahedron.obj --weld 100
 sed 's/^f 1 2 5/f 2 1 5/' octahedron.obj >turned.obj
 run 1 "turned.obj: " network turned.obj -o x.step
 check "which names the remedy of the program: $(cat err)" grep -q -- --repair err

@@ -169,6 +169,23 @@ static void test_calls(batten_context *ctx, scratch *s) {
   batten_network_free(network);
 }
 
+/* Too small for CAD systems in mm, but not in m. */
+static void test_size(batten_context *ctx, scratch *s) {
+  double vertices[12];
+  for (int i = 0; i < 12; i++) vertices[i] = 1e-6 * tetrahedron[i];
+  batten_network *network = NULL;
+  T_OK(network_of(ctx, map_flat, 4, vertices, 4, tetrahedron_faces, 1, false, &network), ctx);
+  batten_write_network_options o = batten_write_network_options_default();
+  const char *path = scratch_file(s, "small.step");
+  T_STATUS(batten_write_network(ctx, network, &o, path), BATTEN_E_INVALID, ctx,
+           "network: its size is 3.74166e-06 mm; CAD files need 1e-05 mm at least: scale it or choose another unit");
+  T_CHECK(scratch_count(s) == 0, "and no file is begun");
+  o.unit = BATTEN_UNIT_M;
+  T_OK(batten_write_network(ctx, network, &o, path), ctx);
+  unlink(path);
+  batten_network_free(network);
+}
+
 /* ---- VTK --------------------------------------------------------------------------------------------- */
 
 /* The rule as VTK states it: corners, then sides 0-1, 1-2, 2-0, then the inside likewise. */
@@ -284,6 +301,7 @@ int main(void) {
   scratch s;
   scratch_open(&s);
   test_calls(ctx, &s);
+  test_size(ctx, &s);
   test_back(ctx, &s);
   test_refused(ctx);
   test_vtk_order();

@@ -88,11 +88,15 @@ static void test_meshes(void) {
 
   m = scene_mesh_octahedron(); /* differences overflow */
   scene_mesh_scale(&m, 0.9 * DBL_MAX, 0.9 * DBL_MAX, 0.9 * DBL_MAX);
-  refused(m, "vertices: their box has the size inf; scale or check the mesh");
+  refused(m, "vertices: their box has the size inf; must be 1e-70 .. 1e+70: scale the mesh");
+
+  m = scene_mesh_octahedron(); /* its curvatures to the 4th power would */
+  scene_mesh_scale(&m, 1e-100, 1e-100, 1e-100);
+  refused(m, "vertices: their box has the size 2e-100; must be 1e-70 .. 1e+70: scale the mesh");
 
   m = scene_mesh_octahedron();
   scene_mesh_scale(&m, 0, 0, 0);
-  refused(m, "vertices: their box has the size 0; scale or check the mesh");
+  refused(m, "vertices: their box has the size 0; must be 1e-70 .. 1e+70: scale the mesh");
 }
 
 /* ---- options --------------------------------------------------------------------------------------- */
