@@ -17,7 +17,6 @@ enum { FILLS = 6, PLAIN_FILLS = 4 };
 static batten_network_options options_for(int fill) {
   batten_network_options o = batten_network_options_default();
   o.fill = fills[fill];
-  o.check_samples = 5;
   return o;
 }
 
@@ -455,6 +454,12 @@ static void test_inexact(void) {
     T_CHECK(status == BATTEN_W_ACCURACY && strstr(batten_error(ctx), "opt.check_samples: 0") &&
                 isnan(info.normal_jump_max_deg) && isnan(info.gap_max),
             "unchecked: %s", batten_error(ctx));
+    batten_network_free(network);
+    o.check_samples = 8;
+    network = build_with(ctx, &m, &o, &info, &status);
+    T_CHECK(status == BATTEN_W_ACCURACY && strstr(batten_error(ctx), "opt.check_samples: 8 places") &&
+                info.normal_jump_max_deg < 1e-11,
+            "hardly checked: %s", batten_error(ctx));
     batten_network_free(network);
     scene_mesh_free(&m);
   }
