@@ -245,7 +245,7 @@ static void test_split_stops(void) {
   build_call call = {&m, batten_network_options_default()};
   call.options.fill = BATTEN_FILL_DEGREE7;
   call.options.normal_passes = 0;
-  call.options.check_samples = 2;
+  call.options.check_samples = 9;
   batten_mesh *mesh = NULL;
   batten_network *network = NULL;
   batten_network_info info = {.faces = 0};
