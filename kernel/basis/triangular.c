@@ -105,56 +105,12 @@ void triangular_basis(unsigned n, double u, double v, unsigned order, double *ta
     }
 }
 
-void triangular_elevate(unsigned n, unsigned dims, const double *net, double *out) {
-  for (unsigned k = 0; k <= n + 1; k++)
-    for (unsigned j = 0; j + k <= n + 1; j++)
-      for (unsigned d = 0; d < dims; d++) {
-        double sum = 0;
-        if (j + k <= n) sum += (n + 1 - j - k) * net[triangular_index(n, j, k) * dims + d];
-        if (j > 0) sum += j * net[triangular_index(n, j - 1, k) * dims + d];
-        if (k > 0) sum += k * net[triangular_index(n, j, k - 1) * dims + d];
-        *out++ = sum / (n + 1);
-      }
-}
-
 /* n! / (a! j! k!), a = n - j - k: whole numbers below 2^53 for n <= 24, each quotient exact. */
 static double trinomial(unsigned n, unsigned j, unsigned k) {
   double value = 1;
   for (unsigned i = 1; i <= j; i++) value = value * (n - j - k + i) / i;
   for (unsigned i = 1; i <= k; i++) value = value * (n - k + i) / i;
   return value;
-}
-
-void triangular_product(unsigned n, const double *a, size_t stride_a, unsigned m, const double *b, size_t stride_b,
-                        double *out, size_t stride_out) {
-  unsigned sum = n + m;
-  double weight[TRIANGULAR_MAX];
-  for (unsigned k = 0, i = 0; k <= m; k++)
-    for (unsigned j = 0; j + k <= m; j++, i++) weight[i] = trinomial(m, j, k) * b[i * stride_b];
-  for (size_t i = 0; i < triangular_count(sum); i++) out[i * stride_out] = 0;
-  for (unsigned ka = 0, ia = 0; ka <= n; ka++)
-    for (unsigned ja = 0; ja + ka <= n; ja++, ia++) {
-      double factor = trinomial(n, ja, ka) * a[ia * stride_a];
-      const double *w = weight;
-      for (unsigned k = 0; k <= m; k++) {
-        double *row = out + triangular_index(sum, ja, ka + k) * stride_out;
-        for (unsigned j = 0; j + k <= m; j++) row[j * stride_out] += factor * *w++;
-      }
-    }
-  for (unsigned k = 0, i = 0; k <= sum; k++)
-    for (unsigned j = 0; j + k <= sum; j++, i++) out[i * stride_out] /= trinomial(sum, j, k);
-}
-
-void triangular_gradient(unsigned n, const double (*net)[3], double (*du)[3], double (*dv)[3]) {
-  for (unsigned k = 0, i = 0; k < n; k++)
-    for (unsigned j = 0; j + k < n; j++, i++) {
-      const double *at = net[triangular_index(n, j, k)], *right = net[triangular_index(n, j + 1, k)],
-                   *up = net[triangular_index(n, j, k + 1)];
-      for (int d = 0; d < 3; d++) {
-        du[i][d] = n * (right[d] - at[d]);
-        dv[i][d] = n * (up[d] - at[d]);
-      }
-    }
 }
 
 void triangular_normal(unsigned n, const double (*net)[3], double (*out)[3]) {
@@ -236,14 +192,4 @@ void triangular_split(unsigned n, unsigned dims, const double *net, double *out,
     turn(n, dims, out + 3 * size, part, out + part * size);
   }
   triangular_part(n, dims, net, middle[3], out + 3 * size, work);
-}
-
-void triangular_blossom(unsigned n, const double (*net)[3], const double (*places)[2], double out[3]) {
-  double q[TRIANGULAR_MAX][3];
-  const double(*from)[3] = net;
-  for (unsigned m = n; m > 0; m--) {
-    step(m, 3, from[0], places[n - m][0], places[n - m][1], q[0]);
-    from = (const double(*)[3])q;
-  }
-  memcpy(out, from[0], 3 * sizeof *out);
 }

@@ -31,17 +31,6 @@ void triangular_basis(unsigned n, double u, double v, unsigned order, double *ta
 
 /* Coefficients come in groups of `dims` numbers (1: a function, 3: a net) in what follows. */
 
-/* The same polynomial in degree n + 1: out [count(n + 1)][dims], not in place. Any n. */
-void triangular_elevate(unsigned n, unsigned dims, const double *net, double *out);
-
-/* Product of two functions of degrees n and m, degree n + m; neighbouring coefficients are stride apart. n, m <= 12.
- */
-void triangular_product(unsigned n, const double *a, size_t stride_a, unsigned m, const double *b, size_t stride_b,
-                        double *out, size_t stride_out);
-
-/* Derivatives by u and v in degree n - 1: du, dv [count(n - 1)][3]; n >= 1. */
-void triangular_gradient(unsigned n, const double (*net)[3], double (*du)[3], double (*dv)[3]);
-
 /* du x dv of a net, degree 2 n - 2 (of degree 1: a constant): out [count(2 n - 2)][3], n >= 1. */
 void triangular_normal(unsigned n, const double (*net)[3], double (*out)[3]);
 
@@ -57,8 +46,5 @@ static inline void triangular_split_place(unsigned part, double u, double v, dou
   out[0] = part == 3 ? 0.5 - 0.5 * u : 0.5 * u + (part == 1 ? 0.5 : 0);
   out[1] = part == 3 ? 0.5 - 0.5 * v : 0.5 * v + (part == 2 ? 0.5 : 0);
 }
-
-/* The symmetric n-affine form whose diagonal the polynomial is, at n places (u, v): out [3]. */
-void triangular_blossom(unsigned n, const double (*net)[3], const double (*places)[2], double out[3]);
 
 #endif

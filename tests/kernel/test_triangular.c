@@ -95,9 +95,9 @@ static void test_jets(uint64_t *seed) {
           for (int d = 0; d < 3; d++) sum[i][d] += basis[(size_t)i * triangular_count(n) + c] * b[c][d];
       for (int i = 0; i < 10; i++)
         table = worse(table, apart(sum[i], jet[i], 3) / (size * pow(fmax(n, 1), i < 1   ? 0
-                                                                               : i < 3 ? 1
-                                                                               : i < 6 ? 2
-                                                                                       : 3)));
+                                                                                : i < 3 ? 1
+                                                                                : i < 6 ? 2
+                                                                                        : 3)));
     }
   }
   T_RATIO(value, 100 * DBL_EPSILON, "values of degrees 0 .. 12, inside and outside, against powers");
@@ -121,45 +121,24 @@ static void test_lower_orders(uint64_t *seed) {
   T_CHECK(same && kept, "lower orders give the first entries and write no more");
 }
 
-static void test_elevation_and_products(uint64_t *seed) {
-  double raised = 0, product = 0, cross = 0;
+static void test_normal(uint64_t *seed) {
+  double cross = 0;
   for (unsigned n = 1; n <= TRIANGULAR_DEGREE; n++) {
     net a;
     random_net(seed, n, &a);
-    double up[3 * 105], one[TRIANGULAR_MAX], result[325], u = t_uniform(seed), v = (1 - u) * t_uniform(seed);
-    double p[3], q[3];
-    triangular_elevate(n, 3, a.b[0], up);
-    by_definition(n, a.b[0], 3, u, v, p);
-    by_definition(n + 1, up, 3, u, v, q);
-    raised = worse(raised, apart(p, q, 3));
-    unsigned m = 13 - n;
-    for (size_t i = 0; i < triangular_count(m); i++) one[i] = t_uniform(seed);
-    triangular_product(n, a.b[0] + 1, 3, m, one, 1, result, 1);
-    double left, right;
-    by_definition(m, one, 1, u, v, &left);
-    by_definition(n + m, result, 1, u, v, &right);
-    product = worse(product, fabs(left * p[1] - right));
-
-    double normal[276][3], jet[3][3], expected[3];
+    double u = t_uniform(seed), v = (1 - u) * t_uniform(seed), normal[276][3], jet[3][3], expected[3], q[3];
     triangular_normal(n, (const double(*)[3])a.b, normal);
     by_definition(2 * n - 2, normal[0], 3, u, v, q);
     triangular_jet(n, (const double(*)[3])a.b, u, v, 1, jet);
     for (int d = 0; d < 3; d++)
       expected[d] = jet[1][(d + 1) % 3] * jet[2][(d + 2) % 3] - jet[1][(d + 2) % 3] * jet[2][(d + 1) % 3];
     cross = worse(cross, apart(q, expected, 3) / (n * n));
-    double du[TRIANGULAR_MAX][3], dv[TRIANGULAR_MAX][3];
-    triangular_gradient(n, (const double(*)[3])a.b, du, dv);
-    by_definition(n - 1, du[0], 3, u, v, p);
-    by_definition(n - 1, dv[0], 3, u, v, q);
-    cross = worse(cross, worse(apart(p, jet[1], 3), apart(q, jet[2], 3)) / n);
   }
-  T_RATIO(raised, 30 * DBL_EPSILON, "elevation keeps the polynomial");
-  T_RATIO(product, 100 * DBL_EPSILON, "products of functions of degrees n and 13 - n");
-  T_RATIO(cross, 100 * DBL_EPSILON, "gradient nets, and du x dv in Bernstein form");
+  T_RATIO(cross, 100 * DBL_EPSILON, "du x dv in Bernstein form");
 }
 
 static void test_parts(uint64_t *seed) {
-  double split = 0, part = 0, blossom = 0, outer = 0;
+  double split = 0, part = 0;
   for (unsigned n = 0; n <= TRIANGULAR_DEGREE; n++) {
     net a, cut;
     random_net(seed, n, &a);
@@ -186,27 +165,9 @@ static void test_parts(uint64_t *seed) {
       by_definition(n, a.b[0], 3, x[0], x[1], q);
       part = worse(part, apart(p, q, 3));
     }
-    /* A control point is the blossom at the corners. */
-    double places[TRIANGULAR_DEGREE][2] = {{0}};
-    for (unsigned k = 0; k <= n; k++)
-      for (unsigned j = 0; j + k <= n; j++) {
-        for (unsigned i = 0; i < n; i++) {
-          unsigned turn = (i + 2) % n; /* the order of the arguments is free */
-          places[turn][0] = i < j;
-          places[turn][1] = i >= j && i < j + k;
-        }
-        triangular_blossom(n, (const double(*)[3])a.b, (const double(*)[2])places, p);
-        blossom = worse(blossom, apart(p, a.b[triangular_index(n, j, k)], 3));
-      }
-    for (unsigned i = 0; i < n; i++) places[i][0] = 1.5, places[i][1] = -0.75;
-    triangular_blossom(n, (const double(*)[3])a.b, (const double(*)[2])places, p);
-    by_definition(n, a.b[0], 3, 1.5, -0.75, q);
-    outer = worse(outer, apart(p, q, 3) / pow(2.5, n));
   }
   T_RATIO(split, 40 * DBL_EPSILON, "the four parts of the midpoints");
   T_RATIO(part, 40 * DBL_EPSILON, "parts over triangles, with and without a common corner");
-  T_RATIO(blossom, 0, "blossoms at corners are control points");
-  T_RATIO(outer, 40 * DBL_EPSILON, "the blossom's diagonal is the polynomial");
 }
 
 static void test_scaling(uint64_t *seed) {
@@ -229,7 +190,7 @@ int main(void) {
   test_by_hand();
   test_jets(&seed);
   test_lower_orders(&seed);
-  test_elevation_and_products(&seed);
+  test_normal(&seed);
   test_parts(&seed);
   test_scaling(&seed);
   return t_done();
