@@ -125,9 +125,21 @@ static void put_loop(iges_file *f) {
   end_entity(f);
 }
 
+/* A face has the normal of its surface, and that points out of the material: surfaces whose own does not are
+ * mirrored, which exchanges their parameters. */
+static bool is_mirrored(const iges_file *f, const batten_network_patch *patch) {
+  const bx_component *c = &f->brep->components[f->brep->component[patch->face]];
+  return c->inward != (c->parent != BX_NONE);
+}
+
 /* Side of the face in space, in the direction of the loop. */
 static unsigned side_curve(iges_file *f, const batten_network_patch *patch, unsigned side, double (*points)[3]) {
-  if (f->product->form == BATTEN_CAD_TRIMMED) return bx_patch_curve(f->brep, patch, side, points);
+  if (f->product->form == BATTEN_CAD_TRIMMED) {
+    bool mirrored = is_mirrored(f, patch);
+    unsigned degree = bx_patch_curve(f->brep, patch, mirrored ? 2 - side : side, points);
+    if (mirrored) bx_curve_reverse(degree, points);
+    return degree;
+  }
   unsigned n = patch->degree, width = n + 1;
   for (unsigned i = 0; i <= n; i++) {
     unsigned s = side == 0 ? i : side == 1 ? n : side == 2 ? n - i : 0;
@@ -144,6 +156,12 @@ static void put_face(iges_file *f, const batten_network_patch *patch, unsigned s
   bx_corners places;
   size_t first = f->entity;
   bx_corners_of(f->product->form, square, places);
+  if (is_mirrored(f, patch))
+    for (int i = 0; i < 3; i++) {
+      double swap = places[1][i];
+      places[1][i] = places[2][i];
+      places[2][i] = swap;
+    }
   bx_patch_square(&f->work, patch->degree, patch->control_points, (const double(*)[3])places, &f->square[0][0]);
   put_surface(f, patch->degree);
   if (f->sides) {

@@ -241,7 +241,7 @@ static void test_stops(void) {
 static void test_split_stops(void) {
   scene_mesh m = scene_mesh_octahedron();
   uint64_t seed = 1;
-  for (size_t i = 0; i < 3 * m.vertices; i++) m.points[i] += 0.8 * (2 * t_uniform(&seed) - 1);
+  for (size_t i = 0; i < 3 * m.vertices; i++) m.points[i] += 2 * t_uniform(&seed) - 1;
   build_call call = {&m, batten_network_options_default()};
   call.options.fill = BATTEN_FILL_DEGREE7;
   call.options.normal_passes = 0;

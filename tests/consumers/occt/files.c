@@ -50,7 +50,7 @@ static void write_files(batch *b, const batten_network *network, const known *k)
       if (!done(b, batten_write_network(b->ctx, network, &o, path), path)) return;
       double scale = form == 2 ? 10 : 1, volume = isnan(k->volume) ? m.volume : k->volume;
       printf("%s %zu %zu %.17g %.17g %.17g\n", path, (form == 1 ? 3 : 1) * patches, iges ? 0 : k->solids,
-             iges || k->solids == 0 ? NAN : scale * scale * scale * volume, scale * scale * m.area, k->angle);
+             k->solids == 0 ? NAN : scale * scale * scale * volume, scale * scale * m.area, k->angle);
     }
 }
 

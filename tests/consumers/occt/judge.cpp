@@ -162,7 +162,7 @@ static void judge(const std::string &file, size_t faces, size_t solids, double v
   line(have == solids, name + std::to_string(have) + " solids of " + std::to_string(solids));
   if (!std::isnan(volume)) {
     GProp_GProps props;
-    BRepGProp::VolumeProperties(shape, props, 1e-12, Standard_True);
+    BRepGProp::VolumeProperties(shape, props, 1e-12, step); /* of closed shells; IGES: by the normals of its faces */
     double off = std::fabs(props.Mass() - volume) / std::fabs(volume);
     line(off <= 1e-9, name + "volume " + text(props.Mass()) + ", off by " + text(off));
   }
