@@ -38,18 +38,18 @@ static batten_status unit_vector(batten_context *ctx, const char *name, const do
 }
 
 static batten_status make_light(batten_context *ctx, const batten_lines_options *opt, light *out) {
-  batten_lines_options o = opt ? *opt : batten_lines_options_default();
-  batten_status st = batten_check_struct(ctx, "batten_lines_options", o.struct_size, sizeof o);
+  batten_status st = batten_check_struct(ctx, "batten_lines_options", opt->struct_size, sizeof *opt);
   if (st < 0) return st;
-  if (o.kind != BATTEN_LINES_ISOPHOTE && o.kind != BATTEN_LINES_REFLECTION)
-    return batten_fail(ctx, BATTEN_E_INVALID, "opt.kind: %d; give BATTEN_LINES_ISOPHOTE or _REFLECTION", (int)o.kind);
-  if (o.count < 1 || o.count > 1000)
-    return batten_fail(ctx, BATTEN_E_INVALID, "opt.count: %u; give 1 to 1000", o.count);
-  *out = (light){.kind = o.kind, .count = o.count};
-  st = unit_vector(ctx, "direction", o.direction, out->direction);
-  if (st < 0 || o.kind == BATTEN_LINES_ISOPHOTE) return st;
+  if (opt->kind != BATTEN_LINES_ISOPHOTE && opt->kind != BATTEN_LINES_REFLECTION)
+    return batten_fail(ctx, BATTEN_E_INVALID, "opt.kind: %d; give BATTEN_LINES_ISOPHOTE or _REFLECTION",
+                       (int)opt->kind);
+  if (opt->count < 1 || opt->count > 1000)
+    return batten_fail(ctx, BATTEN_E_INVALID, "opt.count: %u; give 1 to 1000", opt->count);
+  *out = (light){.kind = opt->kind, .count = opt->count};
+  st = unit_vector(ctx, "direction", opt->direction, out->direction);
+  if (st < 0 || opt->kind == BATTEN_LINES_ISOPHOTE) return st;
   double axis[3];
-  st = unit_vector(ctx, "light_axis", o.light_axis, axis);
+  st = unit_vector(ctx, "light_axis", opt->light_axis, axis);
   if (st < 0) return st;
   /* The coordinate axis that is least along it, made orthogonal. */
   int least = 0;
@@ -91,6 +91,8 @@ batten_status batten_network_line_values(batten_context *ctx, const batten_mesh 
   size_t count = batten_mesh_vertex_count(tessellation);
   if (count && !values) return batten_fail(ctx, BATTEN_E_INVALID, "values: NULL; give room for %zu", count);
   light l;
+  batten_lines_options defaults = batten_lines_options_default();
+  if (!opt) opt = &defaults;
   batten_status st = make_light(ctx, opt, &l);
   if (st < 0) return st;
   const double *normals = normals_of(ctx, tessellation);
@@ -167,10 +169,12 @@ batten_status batten_network_lines(batten_context *ctx, const batten_network *ne
                        : count  ? "segments"
                                 : "count");
   light l;
+  batten_lines_options defaults = batten_lines_options_default();
+  if (!opt) opt = &defaults;
   batten_status st = make_light(ctx, opt, &l);
   if (st < 0) return st;
   batten_tessellate_options tessellate = batten_tessellate_options_default();
-  tessellate.density = opt ? opt->density : batten_lines_options_default().density;
+  tessellate.density = opt->density;
   tessellate.per_patch = 1;
   if (tessellate.density < 1 || tessellate.density > 512)
     return batten_fail(ctx, BATTEN_E_INVALID, "opt.density: %u; give 1 to 512", tessellate.density);

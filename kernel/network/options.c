@@ -85,9 +85,12 @@ static batten_status check_numbers(batten_context *ctx, const batten_network_opt
 
 batten_status net_options_check(batten_context *ctx, const batten_network_options *given,
                                 batten_network_options *out) {
-  batten_network_options o = given ? *given : batten_network_options_default();
-  batten_status st = batten_check_struct(ctx, "batten_network_options", o.struct_size, sizeof o);
-  if (st >= 0) st = check_words(ctx, &o);
+  batten_network_options o = batten_network_options_default();
+  batten_status st = BATTEN_OK;
+  if (given) st = batten_check_struct(ctx, "batten_network_options", given->struct_size, sizeof o);
+  if (st < 0) return st;
+  if (given) o = *given; /* not before its size is known */
+  st = check_words(ctx, &o);
   if (st >= 0) st = check_numbers(ctx, &o);
   if (st >= 0) *out = o;
   return st;

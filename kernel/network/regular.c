@@ -70,18 +70,16 @@ static bool cones_apart(unsigned n, const double (*net)[3]) {
 
 /* All on one side of the plane orthogonal to their sum. */
 static bool on_one_side(size_t count, const double (*normals)[3]) {
-  double sum[3] = {0, 0, 0}, most = 0, least = INFINITY;
+  double sum[3] = {0, 0, 0}, most = 0;
   for (size_t i = 0; i < count; i++)
     for (int d = 0; d < 3; d++) {
       sum[d] += normals[i][d];
       most = fmax(most, fabs(normals[i][d]));
     }
   if (!vec_normalize(sum)) return false;
-  for (size_t i = 0; i < count; i++) {
-    double along = vec_dot(normals[i], sum);
-    if (!(along >= least)) least = along; /* NaN goes through */
-  }
-  return least > MARGIN * most;
+  for (size_t i = 0; i < count; i++)
+    if (!(vec_dot(normals[i], sum) > MARGIN * most)) return false;
+  return true;
 }
 
 size_t net_regular_work(unsigned degree) {

@@ -367,10 +367,12 @@ done:
 batten_status batten_network_tessellate(batten_context *ctx, const batten_network *network,
                                         const batten_tessellate_options *opt, batten_mesh **out) {
   if (!ctx) return BATTEN_E_INVALID;
-  batten_tessellate_options o = opt ? *opt : batten_tessellate_options_default();
-  batten_status st = check(ctx, network, &o, out);
+  batten_tessellate_options defaults = batten_tessellate_options_default();
+  if (!opt) opt = &defaults;
+  batten_status st = check(ctx, network, opt, out);
   if (st < 0) return st;
-  tessellation t = {.network = network, .tolerance = o.tolerance, .density = o.density, .shared = o.per_patch == 0};
+  tessellation t = {
+      .network = network, .tolerance = opt->tolerance, .density = opt->density, .shared = opt->per_patch == 0};
   batten_mesh *mesh = batten_alloc(ctx, sizeof *mesh);
   if (!mesh) return BATTEN_E_NOMEM;
   *mesh = (batten_mesh){.ctx = ctx};

@@ -301,6 +301,26 @@ static void test_certificate(batten_context *ctx) {
   }
 }
 
+/* Of a struct of another version nothing but its size is read: memory checkers would tell. */
+static void test_other_version(batten_context *ctx) {
+  shape s = shape_octahedron();
+  batten_network *n = network_of(ctx, &s), *built = NULL;
+  batten_mesh *mesh = NULL;
+  size_t *size = malloc(sizeof *size), count = 0, bytes = 0;
+  double *segments = NULL;
+  *size = sizeof *size;
+  void *given = size;
+  T_OK(batten_network_tessellate(ctx, n, NULL, &mesh), ctx);
+  T_STATUS(batten_network_build(ctx, mesh, given, &built, NULL), BATTEN_E_INVALID, ctx, "struct_size: 8");
+  T_STATUS(batten_network_bytes(ctx, 4, 4, given, &bytes, NULL), BATTEN_E_INVALID, ctx, "struct_size: 8");
+  T_STATUS(batten_network_tessellate(ctx, n, given, &mesh), BATTEN_E_INVALID, ctx, "struct_size: 8");
+  T_STATUS(batten_network_lines(ctx, n, given, &count, &segments), BATTEN_E_INVALID, ctx, "struct_size: 8");
+  free(size);
+  batten_mesh_free(mesh);
+  batten_network_free(n);
+  shape_free(&s);
+}
+
 /* ---- regularity --------------------------------------------------------------------------------- */
 
 static void fold(const double xy[2], double out[3]) { /* along u = 0.6 */
@@ -430,6 +450,7 @@ int main(void) {
   test_units(ctx, three);
   test_built(ctx);
   test_certificate(ctx);
+  test_other_version(ctx);
   test_regularity(ctx);
   test_nothing_to_measure(ctx);
   shape s = shape_graph(2, 2, 3, cap);
