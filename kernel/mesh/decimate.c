@@ -5,8 +5,8 @@
  * at the new place. A little of the edge's own length decides where errors are equal: in the plane short edges go
  * first. A collapse is refused where it would change the topology (the link condition [Dey, Edelsbrunner, Guha,
  * Nekhayev 1999], here: no common neighbours but the edge's own, no vertex left with two triangles, no boundary
- * vertices joined across the surface), turn a triangle over, or leave a sliver; edges that were refused get another
- * chance when all others are through. Ties go by number: the same result everywhere. */
+ * vertices joined across the surface), turn a triangle over, fold a vertex, or leave a sliver; edges that were
+ * refused get another chance when all others are through. Ties go by number: the same result everywhere. */
 #include <batten/mesh.h>
 #include <string.h>
 
@@ -286,9 +286,81 @@ static bool keeps_shape(const decimation *d, uint32_t v, uint32_t other, const d
   return true;
 }
 
+/* Vertices a and b as they are (point NULL), or both at the point. */
+typedef struct joined {
+  uint32_t a, b;
+  const double *point;
+} joined;
+
+static const double *place_of(const decimation *d, const joined *j, uint32_t v) {
+  return j->point && (v == j->a || v == j->b) ? j->point : d->points + 3 * (size_t)v;
+}
+
+/* Unit normal of the triangle behind h; false when it goes, or has none. */
+static bool joined_normal(const decimation *d, const joined *j, uint32_t h, double n[3]) {
+  uint32_t v[3] = {start_of(d, h), end_of(d, h), start_of(d, mesh_previous(h))};
+  unsigned moved = 0;
+  for (int k = 0; k < 3; k++) moved += v[k] == j->a || v[k] == j->b;
+  if (j->point && moved == 2) return false;
+  vec_triangle_normal(place_of(d, j, v[0]), place_of(d, j, v[1]), place_of(d, j, v[2]), n);
+  return vec_normalize(n);
+}
+
+/* The least product of w with the normals of the fans of v and `other` (MESH_NONE: none); which [3]: that normal. */
+static double least_product(const decimation *d, const joined *j, uint32_t v, uint32_t other, const double *w,
+                            double which[3]) {
+  double least = 1, n[3];
+  for (int fan = 0; fan < 2 && v != MESH_NONE; fan++, v = other)
+    for (uint32_t h = d->out[v]; h != MESH_NONE; h = turn(d, v, h)) {
+      double product = joined_normal(d, j, h, n) ? vec_dot(n, w) : 1;
+      if (!(product < least)) continue;
+      least = product;
+      memcpy(which, n, sizeof n);
+    }
+  return least;
+}
+
+/* How far a plane at the vertex sees all its triangles from the front: nearly the most that the least product of its
+ * normal with theirs can be, up to `enough`. */
+static double frontness(const decimation *d, const joined *j, uint32_t v, uint32_t other, double enough) {
+  double w[3] = {0}, n[3], best = -1;
+  uint32_t fans[2] = {v, other};
+  for (int fan = 0; fan < 2 && fans[fan] != MESH_NONE; fan++)
+    for (uint32_t h = d->out[fans[fan]]; h != MESH_NONE; h = turn(d, fans[fan], h))
+      for (int k = 0; joined_normal(d, j, h, n) && k < 3; k++) w[k] += n[k];
+  for (int step = 1; step < 8 && best < enough && vec_normalize(w); step++) {
+    best = fmax(best, least_product(d, j, v, other, w, n));
+    for (int k = 0; k < 3; k++) w[k] += n[k] / (step + 1);
+  }
+  return best;
+}
+
+/* No vertex may come to have triangles that no plane sees all from the front, where folds begin. */
+static bool keeps_fronts(const decimation *d, uint32_t a, uint32_t b, const double *point) {
+  const double FRONT = 0.3; /* 73 degrees */
+  joined before = {a, b, NULL}, after = {a, b, point};
+  const uint32_t ends[2] = {a, b};
+  double front = frontness(d, &after, a, b, FRONT);
+  if (front < FRONT &&
+      front < fmin(frontness(d, &before, a, MESH_NONE, FRONT), frontness(d, &before, b, MESH_NONE, FRONT)))
+    return false;
+  for (int end = 0; end < 2; end++)
+    for (uint32_t h = d->out[ends[end]]; h != MESH_NONE; h = turn(d, ends[end], h)) {
+      uint32_t last = start_of(d, mesh_previous(h));
+      const uint32_t ring[2] = {end_of(d, h), d->twin[mesh_previous(h)] == MESH_NONE ? last : MESH_NONE};
+      for (int k = 0; k < 2; k++) {
+        if (ring[k] == MESH_NONE || ring[k] == a || ring[k] == b) continue;
+        double now = frontness(d, &after, ring[k], MESH_NONE, FRONT);
+        if (now < FRONT && now < frontness(d, &before, ring[k], MESH_NONE, FRONT)) return false;
+      }
+    }
+  return true;
+}
+
 static bool may_go(decimation *d, uint32_t h, const collapse *c) {
   uint32_t a = start_of(d, h), b = end_of(d, h);
-  return keeps_topology(d, h) && keeps_shape(d, a, b, c->point) && keeps_shape(d, b, a, c->point);
+  return keeps_topology(d, h) && keeps_shape(d, a, b, c->point) && keeps_shape(d, b, a, c->point) &&
+         keeps_fronts(d, a, b, c->point);
 }
 
 /* ---- collapse -------------------------------------------------------------------------------------- */
