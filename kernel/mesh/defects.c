@@ -225,11 +225,6 @@ static void judge_edge(const uint32_t *triangles, const uint32_t *run, size_t co
   }
 }
 
-static int is_same_edge(const uint32_t *triangles, uint32_t g, uint32_t h) {
-  uint32_t a = triangles[g], b = triangles[mesh_next(g)], c = triangles[h], e = triangles[mesh_next(h)];
-  return (a == c && b == e) || (a == e && b == c);
-}
-
 /* Those of order that take part are left; their number. */
 static size_t drop_others(size_t half_edges, scratch *s) {
   size_t alive = 0;
@@ -240,7 +235,7 @@ static size_t drop_others(size_t half_edges, scratch *s) {
 
 static size_t edge_length(const uint32_t *corners, const uint32_t *run, size_t most) {
   size_t n = 1;
-  while (n < most && is_same_edge(corners, run[0], run[n])) n++;
+  while (n < most && mesh_is_same_edge(corners, run[0], run[n])) n++;
   return n;
 }
 
@@ -288,7 +283,7 @@ static batten_status judge_places(batten_context *ctx, size_t vertex_count, size
     int open = 0, several = 0;
     for (size_t k = 0; k < n; k++) {
       open |= s->alone[run[k]];
-      several |= !is_same_edge(triangles, run[0], run[k]);
+      several |= !mesh_is_same_edge(triangles, run[0], run[k]);
     }
     for (size_t k = 0; k < n && open && several; k++)
       s->fans[triangles[run[k]]] = s->fans[triangles[mesh_next(run[k])]] = 1;

@@ -18,8 +18,8 @@ void batten_mesh_free(batten_mesh *mesh) {
   batten_free(ctx, mesh);
 }
 
-static batten_status check_mesh(batten_context *ctx, size_t vertex_count, const double *vertices,
-                                size_t triangle_count, const uint32_t *triangles) {
+batten_status batten_mesh_check_arrays(batten_context *ctx, size_t vertex_count, const double *vertices,
+                                       size_t triangle_count, const uint32_t *triangles) {
   if (vertex_count > UINT32_MAX - 1)
     return batten_fail(ctx, BATTEN_E_TOO_LARGE, "vertex_count: %zu; at most %zu", vertex_count,
                        (size_t)UINT32_MAX - 1);
@@ -44,7 +44,7 @@ batten_status batten_mesh_create(batten_context *ctx, size_t vertex_count, const
                                  size_t triangle_count, const uint32_t *triangles, batten_mesh **out) {
   if (!ctx) return BATTEN_E_INVALID;
   if (!out) return batten_fail(ctx, BATTEN_E_INVALID, "out: NULL; give the address of the result");
-  batten_status st = check_mesh(ctx, vertex_count, vertices, triangle_count, triangles);
+  batten_status st = batten_mesh_check_arrays(ctx, vertex_count, vertices, triangle_count, triangles);
   if (st < 0) return st;
   batten_mesh *mesh = batten_alloc(ctx, sizeof *mesh);
   if (!mesh) return BATTEN_E_NOMEM;

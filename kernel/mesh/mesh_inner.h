@@ -25,6 +25,16 @@ struct batten_mesh {
 static inline uint32_t mesh_next(uint32_t h) { return h % 3 == 2 ? h - 2 : h + 1; }
 static inline uint32_t mesh_previous(uint32_t h) { return h % 3 == 0 ? h + 2 : h - 1; }
 
+/* Between the same vertices, whichever way. corners [3 F]. */
+static inline int mesh_is_same_edge(const uint32_t *corners, uint32_t g, uint32_t h) {
+  uint32_t a = corners[g], b = corners[mesh_next(g)], c = corners[h], d = corners[mesh_next(h)];
+  return (a == c && b == d) || (a == d && b == c);
+}
+
+/* What a mesh can be made of: INVALID (names triangle and index), TOO_LARGE. */
+batten_status batten_mesh_check_arrays(batten_context *ctx, size_t vertex_count, const double *vertices,
+                                       size_t triangle_count, const uint32_t *triangles);
+
 /* out [count] = in sorted by key(triangles, item) < key_count, equal ones in their order; in NULL = 0, 1, ...
  * start [key_count + 1] is scratch. */
 void batten_mesh_counting_sort(size_t key_count, size_t count, const uint32_t *triangles,

@@ -81,11 +81,6 @@ static void drop_triangles(repair *r, unsigned allowed) {
 
 /* ---- edges -------------------------------------------------------------------------------------- */
 
-static int is_same_edge(const uint32_t *corners, uint32_t g, uint32_t h) {
-  uint32_t a = corners[g], b = corners[mesh_next(g)], c = corners[h], d = corners[mesh_next(h)];
-  return (a == c && b == d) || (a == d && b == c);
-}
-
 /* Pairs half-edges; *crowded is one of an edge with three triangles or more, or MESH_NONE. */
 static batten_status pair_edges(batten_context *ctx, repair *r, const uint32_t **crowded) {
   size_t half_edges = 3 * r->triangles;
@@ -94,7 +89,8 @@ static batten_status pair_edges(batten_context *ctx, repair *r, const uint32_t *
   *crowded = NULL;
   for (size_t i = 0, n; i < half_edges; i += n) {
     const uint32_t *run = r->order + i;
-    for (n = 0; i + n < half_edges && is_same_edge(r->corners, run[0], run[n]); n++) r->other[run[n]] = MESH_NONE;
+    for (n = 0; i + n < half_edges && mesh_is_same_edge(r->corners, run[0], run[n]); n++)
+      r->other[run[n]] = MESH_NONE;
     if (n == 2) {
       r->other[run[0]] = run[1];
       r->other[run[1]] = run[0];

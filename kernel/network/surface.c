@@ -230,30 +230,6 @@ size_t net_surface_bytes(size_t vertex_count, size_t face_count, size_t crease_c
 
 /* ---- from parts --------------------------------------------------------------------------------- */
 
-static batten_status check_arrays(batten_context *ctx, size_t vertex_count, const double *vertices,
-                                  size_t triangle_count, const uint32_t *triangles, size_t crease_count,
-                                  const uint32_t *creases) {
-  if (vertex_count > UINT32_MAX - 1)
-    return batten_fail(ctx, BATTEN_E_TOO_LARGE, "vertex_count: %zu; at most %zu", vertex_count,
-                       (size_t)UINT32_MAX - 1);
-  if (triangle_count > (UINT32_MAX - 1) / 3)
-    return batten_fail(ctx, BATTEN_E_TOO_LARGE, "triangle_count: %zu; at most %zu", triangle_count,
-                       (size_t)(UINT32_MAX - 1) / 3);
-  if (vertex_count && !vertices) return batten_fail(ctx, BATTEN_E_INVALID, "vertices: NULL; give %zu", vertex_count);
-  if (triangle_count && !triangles)
-    return batten_fail(ctx, BATTEN_E_INVALID, "triangles: NULL; give %zu", triangle_count);
-  if (crease_count && !creases) return batten_fail(ctx, BATTEN_E_INVALID, "creases: NULL; give %zu", crease_count);
-  size_t bad = batten_first_nonfinite(3 * vertex_count, vertices);
-  if (bad < 3 * vertex_count)
-    return batten_fail(ctx, BATTEN_E_INVALID, "vertices[%zu][%zu]: %g; give finite coordinates", bad / 3, bad % 3,
-                       vertices[bad]);
-  for (size_t h = 0; h < 3 * triangle_count; h++)
-    if (triangles[h] >= vertex_count)
-      return batten_fail(ctx, BATTEN_E_INVALID, "triangles[%zu][%zu]: index %lu, but there are %zu vertices", h / 3,
-                         h % 3, (unsigned long)triangles[h], vertex_count);
-  return BATTEN_OK;
-}
-
 static batten_status check_patch(batten_context *ctx, const batten_network_patch *patch, size_t index) {
   if (patch->degree < 1 || patch->degree > TRIANGULAR_DEGREE)
     return batten_fail(ctx, BATTEN_E_INVALID, "patches[%zu].degree: %u; give 1 to %d", index, patch->degree,
@@ -321,8 +297,9 @@ batten_status batten_network_create(batten_context *ctx, size_t vertex_count, co
   if (!ctx) return BATTEN_E_INVALID;
   if (!out) return batten_fail(ctx, BATTEN_E_INVALID, "out: NULL; give the address of the result");
   size_t points = 0;
-  batten_status st = check_arrays(ctx, vertex_count, vertices, triangle_count, triangles, crease_count, creases);
+  batten_status st = batten_mesh_check_arrays(ctx, vertex_count, vertices, triangle_count, triangles);
   if (st < 0) return st;
+  if (crease_count && !creases) return batten_fail(ctx, BATTEN_E_INVALID, "creases: NULL; give %zu", crease_count);
   st = check_patches(ctx, triangle_count, patch_count, patches, &points);
   if (st < 0) return st;
   bool even = true;
