@@ -53,8 +53,9 @@ static const cli_option table[] = {
     {"continuity", OPT_CONTINUITY, "G1|G2",
      "of the curve network: G1 cubics, G2 quintics; default as the fill wants"},
     {"fill", OPT_FILL, "NAME",
-     "auto, fair, fair-linear, ss, ss-classic, peters, degree7, degree6 or pn;\n"
-     "default auto: fair up to 5000 triangles, then degree7 (for G1: ss)"},
+     "how facets are filled: fair, fair-linear, degree7, degree6; of G1 networks: ss,\n"
+     "ss-classic, peters (nearly smooth), pn (not smooth). Default auto: fair up to\n"
+     "5000 triangles, then degree7 (for G1: ss)"},
     {"normals", OPT_NORMALS, "NAME", "to start from: angle, area, inverse-area or sphere; default angle"},
     {"normal-passes", OPT_NORMAL_PASSES, "N", "most passes of their optimisation, 0 keeps them; default 30"},
     {"direction", OPT_DIRECTION, "D2|D1", "of curves in tangent planes: plane curves or projected edges; default D2"},
