@@ -298,9 +298,14 @@ static inline float reached(const float *map, size_t size, const beam *b, const 
   return a + fy * (c - a);
 }
 
+/* Of the unit ball: as far as the shadows of neighbouring beams lie apart. */
+static const float tap_radius = 0.06f;
+
 /* The same over a disc of the map: the few beams of a lamp would leave the edge of a shadow each. */
 static float reached_about(const shading *s, const float *map, const beam *b, const float p[3]) {
+  const float beyond = 1 + tap_radius;
   float sum = 0;
+  if (fabsf(dotf(b->u, p)) > beyond || fabsf(dotf(b->v, p)) > beyond) return 1; /* most of the ground */
   for (size_t i = 0; i < TAPS; i++) {
     float tap[3];
     for (size_t k = 0; k < 3; k++) tap[k] = p[k] + s->taps[i][0] * b->u[k] + s->taps[i][1] * b->v[k];
@@ -310,9 +315,8 @@ static float reached_about(const shading *s, const float *map, const beam *b, co
 }
 
 static void make_taps(float taps[TAPS][2]) {
-  const float radius = 0.06f; /* of the unit ball: as far as the shadows of neighbouring beams lie apart */
   for (int i = 0; i < TAPS; i++) {
-    float r = radius * sqrtf(((float)i + 0.5f) / TAPS), angle = golden_angle * (float)i;
+    float r = tap_radius * sqrtf(((float)i + 0.5f) / TAPS), angle = golden_angle * (float)i;
     taps[i][0] = r * cosf(angle);
     taps[i][1] = r * sinf(angle);
   }
