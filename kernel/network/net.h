@@ -85,6 +85,8 @@ batten_status net_topology_make(batten_context *ctx, size_t vertices, const doub
  * net_topology_free alone. The half-edges out of a vertex that have the same node are its fan, from node_first on;
  * one crease that ends inside the mesh does not cut it, and the fan then begins there. */
 batten_status net_features_make(batten_context *ctx, const batten_network_options *opt, net_topology *topology);
+/* Guides at nodes that are folded: see folds.c. */
+batten_status net_folds_make(batten_context *ctx, net_topology *topology);
 void net_topology_free(batten_context *ctx, net_topology *topology);
 
 /* Node at the start (end = 0) or end (1) of edge e, seen from its left (side = 0, the side of half[e]) or right side

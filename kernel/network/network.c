@@ -73,6 +73,7 @@ static batten_status make_topology(net_work *w) {
     st = net_topology_make(w->ctx, batten_mesh_vertex_count(w->mesh), w->points, batten_mesh_triangle_count(w->mesh),
                            batten_mesh_triangles(w->mesh), &w->topology);
   if (st >= 0) st = net_features_make(w->ctx, &w->opt, &w->topology);
+  if (st >= 0) st = net_folds_make(w->ctx, &w->topology);
   return st;
 }
 

@@ -14,6 +14,8 @@ enum { NODES_PER_TASK = 2048 };
 /* Least product of a normal with those of its triangles, 81 degrees, unless that is more than half of what can be
  * had: a bound that nothing meets which is not on its way to fold. */
 static const double FRONT_MIN = 0.15;
+/* What sees so much needs no better. */
+static const double ENOUGH = 0.5;
 
 /* The triangle's normal at a corner with sides a and b, as long as it counts. */
 static void corner_normal(batten_normal_weights weights, const double *a, const double *b, double *out) {
@@ -107,16 +109,25 @@ static double frontness(const net_topology *t, uint32_t node, const double *w, d
 
 /* The middle of the smallest cap of the unit sphere that holds all normals of the triangles, nearly: to go towards
  * the farthest by ever smaller steps ends there [Badoiu, Clarkson 2003]. */
-static void most_frontal(const net_topology *t, uint32_t node, const net_constraint *c, double *w) {
+double net_normal_front(const net_topology *t, uint32_t node, double normal[3]) {
   enum { STEPS = 100 };
-  for (int step = 2; step < STEPS; step++) {
-    double farthest[3], before[3];
-    memcpy(before, w, sizeof before);
-    frontness(t, node, w, farthest);
+  const net_constraint *c = t->constraint ? t->constraint + node : NULL;
+  double w[3], best;
+  estimate(t, BATTEN_NORMALS_ANGLE, node, w);
+  net_normal_constrain(c, w);
+  memcpy(normal, w, sizeof w);
+  double farthest[3], least = frontness(t, node, w, farthest);
+  best = least;
+  for (int step = 2; step < STEPS && best < ENOUGH; step++) {
     for (int k = 0; k < 3; k++) w[k] += (farthest[k] - w[k]) / step;
-    if (!vec_normalize(w)) memcpy(w, before, sizeof before);
+    if (!vec_normalize(w)) break;
     net_normal_constrain(c, w);
+    least = frontness(t, node, w, farthest);
+    if (least <= best) continue;
+    best = least;
+    memcpy(normal, w, sizeof w);
   }
+  return best;
 }
 
 bool net_normal_guard(const net_topology *t, uint32_t node, double normal[3]) {
@@ -125,10 +136,7 @@ bool net_normal_guard(const net_topology *t, uint32_t node, double normal[3]) {
   double least = frontness(t, node, normal, NULL), center[3], from[3];
   if (least >= FRONT_MIN) return false;
   memcpy(from, normal, sizeof from);
-  estimate(t, BATTEN_NORMALS_ANGLE, node, center);
-  net_normal_constrain(c, center);
-  most_frontal(t, node, c, center);
-  double best = frontness(t, node, center, NULL), bound = fmin(FRONT_MIN, 0.5 * best);
+  double best = net_normal_front(t, node, center), bound = fmin(FRONT_MIN, 0.5 * best);
   if (least >= bound || least >= best) return false;
   /* What is seen grows along the arc from the given normal up to the middle. */
   double seen = 1, unseen = 0;
