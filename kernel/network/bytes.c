@@ -55,7 +55,7 @@ static double build_bytes(const net_counts *c, const batten_network_options *o, 
   double common = 24 * c->vertices + topology_bytes(c) + 24 * c->vertices + c->edges * sizeof(net_local) + c->faces;
   double features = o->crease_angle_deg > 0 || o->crease_count || o->line_count || o->boundary_curves
                         ? c->edges * 120 + c->vertices * (sizeof(net_constraint) + 24.0)
-                        : 0;
+                        : 48 * c->edges; /* guides of folds */
   bool fair = fill == BATTEN_FILL_FAIR || fill == BATTEN_FILL_FAIR_LINEAR, quintic = net_fill_continuity(fill) == 2;
   double nodes = quintic ? c->vertices * sizeof(net_node) : 0, forms = 24 * c->vertices + 160 * c->edges;
   double g1 = solve_bytes(c, o, 2, 0) + c->vertices * sizeof(net_node) +
