@@ -154,8 +154,8 @@ static void test_border(batten_context *ctx) {
   scene_mesh m = scene_mesh_grid(9, 7);
   uint64_t seed = 3;
   batten_mesh *mesh, *out = NULL;
-  for (size_t i = 0; i < m.vertices; i++) m.points[3 * i + 2] = 2;
-  for (size_t i = 0; i < m.vertices; i++) m.points[3 * i] += 0.02 * normal(&seed);
+  for (size_t i = 0; i < m.vertices; i++)
+    scene_point_set(m.points + 3 * i, 0.1 * (double)(i % 9) + 0.02 * normal(&seed), 0.1 * (double)(i / 9), 2);
   mesh = mesh_of(ctx, &m);
   T_OK(batten_mesh_smooth(ctx, mesh, 0.01, &out, NULL), ctx);
   double off = 0;
