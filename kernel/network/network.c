@@ -201,8 +201,11 @@ static batten_status split_singular(net_work *w) {
   return st;
 }
 
-/* The fair fill writes all patches itself; those that it could not keep regular are split as others are. */
+/* The fair fill writes all patches itself. Where its inner points have left a patch that is not regular, the usual
+ * ones take their place, and facets that have no regular patch of one piece are split as others are. */
 static batten_status fill_fair(net_work *w) {
+  double *scratch = batten_alloc_array(w->ctx, net_regular_work(7), sizeof *scratch);
+  if (!scratch) return BATTEN_E_NOMEM;
   batten_status st = net_fair(w->ctx, &w->topology, &w->opt, w->fill == BATTEN_FILL_FAIR_LINEAR, w->nodes,
                               (double(*)[36][3])net_surface_points(w->network, 0), &w->figures);
   for (uint32_t e = 0; st >= 0 && e < w->topology.edges; e++)
@@ -210,10 +213,12 @@ static batten_status fill_fair(net_work *w) {
   for (size_t f = 0; st >= 0 && f < w->topology.faces; f++) {
     net_node corners[3];
     net_ribbon ribbons[3];
-    double patch[36][3];
+    double usual[36][3], (*kept)[3] = net_surface_points(w->network, f);
     net_facet_ribbons(&w->topology, w->nodes, w->local, f, corners, ribbons);
-    w->marks[f] = !net_fill_degree7(corners, ribbons, patch);
+    w->marks[f] = !net_fill_degree7(corners, ribbons, usual);
+    if (!w->marks[f] && !net_regular(7, (const double(*)[3])kept, scratch)) memcpy(kept, usual, sizeof usual);
   }
+  batten_free(w->ctx, scratch);
   return st;
 }
 
