@@ -197,6 +197,37 @@ static inline batten_status shape_network(batten_context *ctx, const shape *s, b
 }
 
 /* x -> factor R x + shift, R a fixed rotation, or the identity. */
+static inline batten_network *network_of(batten_context *ctx, const shape *s) {
+  batten_network *n = NULL;
+  if (shape_network(ctx, s, &n) < 0) {
+    printf("Bail out! %s\n", batten_error(ctx));
+    exit(1);
+  }
+  return n;
+}
+
+/* The larger, and a NaN stays one. */
+static inline double worse(double a, double b) { return isnan(a) || b <= a ? a : b; }
+
+/* ---- maps ---- */
+
+static inline void shape_cap(const double xy[2], double out[3]) {
+  out[0] = xy[0];
+  out[1] = xy[1];
+  out[2] = -0.5 * (xy[0] * xy[0] + xy[1] * xy[1]);
+}
+static inline void shape_ridge(const double xy[2], double out[3]) {
+  out[0] = xy[0];
+  out[1] = xy[1];
+  out[2] = -0.5 * xy[0] * xy[0];
+}
+static inline void shape_saddle(const double xy[2], double out[3]) {
+  double x = xy[0], y = xy[1];
+  out[0] = x;
+  out[1] = y;
+  out[2] = 0.3 * x * x * x - x * y + 0.5 * y * y;
+}
+
 static inline void shape_move(shape *s, bool turn, double factor, const double shift[3]) {
   static const double rotation[3][3] = {
       {2 / 3.0, -1 / 3.0, 2 / 3.0}, {2 / 3.0, 2 / 3.0, -1 / 3.0}, {-1 / 3.0, 2 / 3.0, 2 / 3.0}};

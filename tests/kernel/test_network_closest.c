@@ -6,32 +6,11 @@
 #include "network_shapes.h"
 #include "tap.h"
 
-static double worse(double a, double b) { return isnan(a) || b <= a ? a : b; }
-
-static void cap(const double xy[2], double out[3]) {
-  out[0] = xy[0];
-  out[1] = xy[1];
-  out[2] = -0.5 * (xy[0] * xy[0] + xy[1] * xy[1]);
-}
-static void ridge(const double xy[2], double out[3]) {
-  out[0] = xy[0];
-  out[1] = xy[1];
-  out[2] = -0.5 * xy[0] * xy[0];
-}
 static void wave(const double xy[2], double out[3]) {
   double x = xy[0], y = xy[1];
   out[0] = x;
   out[1] = y;
   out[2] = 0.8 * x * x * x - 0.6 * x + 0.5 * x * y * y + 0.4 * y * y * y;
-}
-
-static batten_network *network_of(batten_context *ctx, const shape *s) {
-  batten_network *n = NULL;
-  if (shape_network(ctx, s, &n) < 0) {
-    printf("Bail out! %s\n", batten_error(ctx));
-    exit(1);
-  }
-  return n;
 }
 
 /* Distance of a point from the octahedron |x| + |y| + |z| = 1: nearest on the triangle of its octant, by projections
@@ -208,7 +187,7 @@ static void test_feet(batten_context *ctx) {
 
 /* Where whole curves or discs are as near to second order and more. */
 static void test_focal_points(batten_context *ctx) {
-  shape s = shape_graph(4, 2, 3, cap);
+  shape s = shape_graph(4, 2, 3, shape_cap);
   batten_network *n = network_of(ctx, &s);
   double start = batten_now();
   const double points[4][3] = {{0, 0, -1}, {0, 0, -0.999999}, {0, 0, -1.5}, {1e-9, 0, -1}};
@@ -222,7 +201,7 @@ static void test_focal_points(batten_context *ctx) {
   T_RATIO(fabs(distances[2] - expected[2]), 1e-12, "beyond it: a circle is nearest");
   batten_network_free(n);
   shape_free(&s);
-  s = shape_graph(3, 3, 0, ridge);
+  s = shape_graph(3, 3, 0, shape_ridge);
   n = network_of(ctx, &s);
   const double axis[3][3] = {{0, 0.1, -1}, {0, -0.7, -1.2}, {0, 3, -1}};
   T_OK(batten_network_closest(ctx, n, 3, axis[0], places, distances), ctx);

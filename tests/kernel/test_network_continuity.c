@@ -14,14 +14,6 @@ static void bump(const double xy[2], double out[3]) {
   out[2] = 0.3 * x * x - 0.2 * x * y * y;
 }
 
-static batten_network *network_of(batten_context *ctx, const shape *s) {
-  batten_network *n = NULL;
-  if (shape_network(ctx, s, &n) < 0) {
-    printf("Bail out! %s\n", batten_error(ctx));
-    exit(1);
-  }
-  return n;
-}
 static batten_network_continuity measured(batten_context *ctx, const shape *s, unsigned samples) {
   batten_network *n = network_of(ctx, s);
   batten_network_continuity c;

@@ -5,38 +5,10 @@
 
 #include <float.h>
 
-static double worse(double a, double b) { return isnan(a) || b <= a ? a : b; }
-
-static void saddle(const double xy[2], double out[3]) {
-  double x = xy[0], y = xy[1];
-  out[0] = x;
-  out[1] = y;
-  out[2] = 0.3 * x * x * x - x * y + 0.5 * y * y;
-}
-static void cap(const double xy[2], double out[3]) {
-  out[0] = xy[0];
-  out[1] = xy[1];
-  out[2] = -0.5 * (xy[0] * xy[0] + xy[1] * xy[1]);
-}
-static void ridge(const double xy[2], double out[3]) {
-  out[0] = xy[0];
-  out[1] = xy[1];
-  out[2] = -0.5 * xy[0] * xy[0];
-}
-
-static batten_network *network_of(batten_context *ctx, const shape *s) {
-  batten_network *n = NULL;
-  if (shape_network(ctx, s, &n) < 0) {
-    printf("Bail out! %s\n", batten_error(ctx));
-    exit(1);
-  }
-  return n;
-}
-
 /* The graph of f: K = (fxx fyy - fxy^2) / W^4, 2 H = ((1 + fy^2) fxx - 2 fx fy fxy + (1 + fx^2) fyy) / W^3 towards
  * the normal, W^2 = 1 + fx^2 + fy^2. */
 static void test_graph(batten_context *ctx, unsigned split) {
-  shape s = shape_graph(3, 3, split, saddle);
+  shape s = shape_graph(3, 3, split, shape_saddle);
   batten_network *n = network_of(ctx, &s);
   uint64_t seed = 3;
   enum { COUNT = 700 };
@@ -52,7 +24,7 @@ static void test_graph(batten_context *ctx, unsigned split) {
   for (size_t i = 0; i < COUNT; i++) {
     const batten_surface_point *p = &points[i];
     double x = p->point[0], y = p->point[1], q[3];
-    saddle((double[2]){x, y}, q);
+    shape_saddle((double[2]){x, y}, q);
     place = worse(place, fabs(q[2] - p->point[2]));
     double fx = 0.9 * x * x - y, fy = y - x, fxx = 1.8 * x, w = sqrt(1 + fx * fx + fy * fy);
     const double up[3] = {-fx / w, -fy / w, 1 / w};
@@ -92,7 +64,7 @@ static batten_surface_point at_place(batten_context *ctx, const batten_network *
 }
 
 static void test_special_places(batten_context *ctx) {
-  shape s = shape_graph(2, 2, 0, cap);
+  shape s = shape_graph(2, 2, 0, shape_cap);
   batten_network *n = network_of(ctx, &s);
   batten_surface_point p = at_place(ctx, n, 0, 0, 1); /* face 0 ends with the middle vertex at k = n */
   T_CHECK(vec_norm(p.point) < 1e-15 && fabs(p.gauss - 1) < 1e-13 && fabs(p.mean - 1) < 1e-13,
@@ -103,7 +75,7 @@ static void test_special_places(batten_context *ctx) {
   batten_network_free(n);
   shape_free(&s);
 
-  s = shape_graph(2, 2, 0, ridge);
+  s = shape_graph(2, 2, 0, shape_ridge);
   n = network_of(ctx, &s);
   p = at_place(ctx, n, 0, 0, 1);
   T_CHECK(fabs(p.principal[0] - 1) < 1e-13 && fabs(p.principal[1]) < 1e-13 &&

@@ -3,29 +3,9 @@
 #include "network_shapes.h"
 #include "tap.h"
 
-static void cap(const double xy[2], double out[3]) {
-  out[0] = xy[0];
-  out[1] = xy[1];
-  out[2] = -0.5 * (xy[0] * xy[0] + xy[1] * xy[1]);
-}
-static void ridge(const double xy[2], double out[3]) {
-  out[0] = xy[0];
-  out[1] = xy[1];
-  out[2] = -0.5 * xy[0] * xy[0];
-}
-
-static batten_network *network_of(batten_context *ctx, const shape *s) {
-  batten_network *n = NULL;
-  if (shape_network(ctx, s, &n) < 0) {
-    printf("Bail out! %s\n", batten_error(ctx));
-    exit(1);
-  }
-  return n;
-}
-
 /* Light from above on a cap: isophotes are circles, n_z = (1 + r^2)^(-1/2). */
 static void test_isophotes(batten_context *ctx) {
-  shape s = shape_graph(4, 2, 3, cap);
+  shape s = shape_graph(4, 2, 3, shape_cap);
   batten_network *n = network_of(ctx, &s);
   batten_lines_options o = batten_lines_options_default();
   memcpy(o.direction, (double[3]){0, 0, 5}, 24);
@@ -71,7 +51,7 @@ static void test_isophotes(batten_context *ctx) {
  * lights along y, the ray mirrored at slope a is at the angle 2 a from the eye: lines are where 2 atan(x) is a level.
  */
 static void test_reflections(batten_context *ctx) {
-  shape s = shape_graph(4, 2, 0, ridge);
+  shape s = shape_graph(4, 2, 0, shape_ridge);
   batten_network *n = network_of(ctx, &s);
   batten_lines_options o = batten_lines_options_default();
   o.kind = BATTEN_LINES_REFLECTION;
@@ -202,7 +182,7 @@ static void test_bad(batten_context *ctx) {
   batten_mesh_free(mesh);
   batten_network_free(n);
   shape_free(&s);
-  s = shape_graph(2, 2, 3, cap);
+  s = shape_graph(2, 2, 3, shape_cap);
   t_fail_every_allocation("batten_network_lines", draw, &s);
   shape_free(&s);
 }

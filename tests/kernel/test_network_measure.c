@@ -9,34 +9,10 @@
 
 #include <float.h>
 
-static void cap(const double xy[2], double out[3]) {
-  out[0] = xy[0];
-  out[1] = xy[1];
-  out[2] = -0.5 * (xy[0] * xy[0] + xy[1] * xy[1]);
-}
-static void saddle(const double xy[2], double out[3]) {
-  out[0] = xy[0];
-  out[1] = xy[1];
-  out[2] = 0.3 * xy[0] * xy[0] * xy[0] - xy[0] * xy[1] + 0.5 * xy[1] * xy[1];
-}
 static void plane(const double xy[2], double out[3]) {
   out[0] = xy[0] + 0.2 * xy[0] * xy[1];
   out[1] = xy[1] + 0.1 * xy[0] * xy[0];
   out[2] = 2 - out[0];
-}
-static void ridge(const double xy[2], double out[3]) {
-  out[0] = xy[0];
-  out[1] = xy[1];
-  out[2] = -0.5 * xy[0] * xy[0];
-}
-
-static batten_network *network_of(batten_context *ctx, const shape *s) {
-  batten_network *n = NULL;
-  if (shape_network(ctx, s, &n) < 0) {
-    printf("Bail out! %s\n", batten_error(ctx));
-    exit(1);
-  }
-  return n;
 }
 static batten_network_measures measured(batten_context *ctx, const shape *s) {
   batten_network *n = network_of(ctx, s);
@@ -85,7 +61,7 @@ static void gauss_rule(double x[FINE], double w[FINE]) {
 /* z = -r^2 / 2 turns about its axis: with s the arc of the meridian, k1 = (1 + r^2)^(-3/2) along it and
  * k2 = (1 + r^2)^(-1/2) around, and |grad II|^2 = (dk1/ds)^2 + 3 (dk2/ds)^2. */
 static void test_cap(batten_context *ctx, unsigned split) {
-  shape s = shape_graph(4, 2, split, cap);
+  shape s = shape_graph(4, 2, split, shape_cap);
   batten_network_measures m = measured(ctx, &s);
   double x[FINE], w[FINE], area = 0, gauss = 0, fairness = 0, moment = 0;
   gauss_rule(x, w);
@@ -123,7 +99,7 @@ static void test_cap(batten_context *ctx, unsigned split) {
 /* On a cylinder over a parabola k1 depends on x alone: |grad II|^2 = (dk1/ds)^2; in a plane it is 0 for any
  * parameters. */
 static void test_flat_ones(batten_context *ctx) {
-  shape s = shape_graph(2, 3, 2, ridge);
+  shape s = shape_graph(2, 3, 2, shape_ridge);
   batten_network_measures m = measured(ctx, &s);
   double x[FINE], w[FINE], fairness = 0;
   gauss_rule(x, w);
@@ -186,7 +162,7 @@ static void test_torus(batten_context *ctx) {
 
 /* For a graph over a square: int K = 2 pi - int kg ds - sum of the exterior angles (Gauss and Bonnet). */
 static void test_gauss_bonnet_with_boundary(batten_context *ctx) {
-  shape s = shape_graph(4, 3, 3, saddle);
+  shape s = shape_graph(4, 3, 3, shape_saddle);
   batten_network_measures m = measured(ctx, &s);
   double x[FINE], w[FINE], turn = 0;
   gauss_rule(x, w);
@@ -356,8 +332,8 @@ static void test_regularity(batten_context *ctx) {
     shape_map *map;
     unsigned degree, cells;
     bool regular;
-  } const cases[] = {{"a cap", cap, 2, 1, true},
-                     {"a saddle in degree 9", saddle, 9, 1, true},
+  } const cases[] = {{"a cap", shape_cap, 2, 1, true},
+                     {"a saddle in degree 9", shape_saddle, 9, 1, true},
                      {"a cylinder of 250 degrees", bent, 8, 1, true},
                      {"parameters bent in a plane", plane, 12, 2, true},
                      {"a line without normal", crease, 3, 1, false},
@@ -453,7 +429,7 @@ int main(void) {
   test_other_version(ctx);
   test_regularity(ctx);
   test_nothing_to_measure(ctx);
-  shape s = shape_graph(2, 2, 3, cap);
+  shape s = shape_graph(2, 2, 3, shape_cap);
   t_fail_every_allocation("batten_network_measure", measure_torus, &s);
   t_cancel_every_progress("batten_network_measure", measure_torus, &s);
   shape_free(&s);
