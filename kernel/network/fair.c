@@ -25,7 +25,7 @@
 enum {
   ITEMS_PER_PART = 4, /* facets at some 20 us at least */
   TRIALS_MAX = 12,    /* of damping in a pass */
-  TURNED = 3,         /* irregular facets that weigh as much as a corner that is turned over */
+  TURNED = 50,        /* irregular facets that weigh as much as a corner that is turned over: never worth it */
   LINEAR_PASSES = 2
 };
 

@@ -198,8 +198,8 @@ static double gap(const net_topology *t, const double *p, const double *w, const
 }
 
 /* The plane of D2 turns a tangent away from its projected edge, where normals differ much by more than the angle to
- * the next edge: the facet between them would turn over. Each keeps to its share of that angle. True when d [3] was
- * changed. */
+ * the next edge, or until the angle to the one behind is more than half a turn: the facet between them would turn
+ * over. Each keeps to its share of what there is. True when d [3] was changed. */
 static bool hold_order(const net_topology *t, const double *w, uint32_t e, unsigned end, const double *chord,
                        double *d) {
   uint32_t h = t->half[e], twin = t->twin[h];
@@ -209,7 +209,10 @@ static bool hold_order(const net_topology *t, const double *w, uint32_t e, unsig
   if (!project(chord, w, middle)) return false;
   double turn = angle_about(w, middle, d);
   double sign = turn > 0 ? 1 : -1;
-  double limit = ORDER_SHARE * fmax(gap(t, p, w, middle, sign, (sign > 0) != end ? left : right), 0);
+  uint32_t ahead = (sign > 0) != end ? left : right, behind = (sign > 0) != end ? right : left;
+  double limit = gap(t, p, w, middle, sign, ahead);
+  if (behind != NET_NONE) limit = fmin(limit, PI - gap(t, p, w, middle, -sign, behind));
+  limit = ORDER_SHARE * fmax(limit, 0);
   if (fabs(turn) <= limit) return false;
   vec_cross(w, middle, v);
   double angle = sign * limit, size = vec_norm(d);
