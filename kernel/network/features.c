@@ -181,13 +181,22 @@ static batten_status find_creases(batten_context *ctx, const features *f, const 
 /* ---- tangents ----------------------------------------------------------------------------------- */
 
 /* Mates and open ends at v; guides of mates. */
+/* Both ends belong to one triangle: with one tangent it would have to make half a turn between them, and be singular.
+ */
+static bool share_triangle(const net_topology *t, uint32_t a, uint32_t b) {
+  uint32_t h = t->half[a / 2];
+  for (int side = 0; side < 2 && h != NET_NONE; side++, h = t->twin[h])
+    if (t->edge[net_next(h)] == b / 2 || t->edge[net_prev(h)] == b / 2) return true;
+  return false;
+}
+
 static void judge_vertex(features *f, uint32_t v) {
   size_t count = gather_ends(f, v);
   const uint32_t *ends = f->ends;
   double tangent[3];
   if (count == 1 && (!is_on_boundary(f, v) || is_boundary_edge(f->t, ends[0] / 2))) f->open[ends[0]] = 1;
   if (count == 2 && chord_turn(f->t, ends[0], ends[1]) <= f->corner_angle &&
-      circle_tangent(f->t, ends[0], ends[1], tangent))
+      !share_triangle(f->t, ends[0], ends[1]) && circle_tangent(f->t, ends[0], ends[1], tangent))
     join_ends(f, ends[0], ends[1], tangent);
 }
 
@@ -283,7 +292,7 @@ static void sector_normal(const features *f, uint32_t end, double *out) {
 /* How far the sector between two ends without mates turns, when its plane is better left to the triangles; else
  * INFINITY. */
 static double straightness(const features *f, uint32_t a, uint32_t b) {
-  if (f->mate[a] != NET_NONE || f->mate[b] != NET_NONE) return INFINITY;
+  if (f->mate[a] != NET_NONE || f->mate[b] != NET_NONE || share_triangle(f->t, a, b)) return INFINITY;
   const double *p = f->t->guide + 3 * (size_t)a, *q = f->t->guide + 3 * (size_t)b;
   double turn = turn_between(p, q), plane[3], normal[3];
   if (turn < STRAIGHT) return turn;

@@ -146,6 +146,27 @@ static void test_noise(void) {
   }
 }
 
+/* Creases along two sides of one triangle: with one tangent it would have to make half a turn there. */
+static void test_creased_corner(void) {
+  static const batten_network_fill fills[3] = {BATTEN_FILL_SS, BATTEN_FILL_DEGREE7, BATTEN_FILL_FAIR};
+  scene_mesh m = scene_mesh_icosphere(4);
+  batten_mesh *mesh = mesh_of(&m);
+  const uint32_t *t = m.corners, creases[4] = {t[0], t[1], t[1], t[2]};
+  for (int i = 0; i < 3; i++) {
+    batten_network_options o = batten_network_options_default();
+    batten_network *network = NULL;
+    batten_network_info info;
+    o.fill = fills[i];
+    o.crease_count = 2;
+    o.creases = creases;
+    o.corner_angle_deg = 170;
+    T_OK(batten_network_build(ctx, mesh, &o, &network, &info), ctx);
+    batten_network_free(network);
+  }
+  batten_mesh_free(mesh);
+  scene_mesh_free(&m);
+}
+
 /* Smoothing takes the noise out of the curvature: that of a sphere comes back. */
 static void test_smoothing(void) {
   scene_mesh m = scene_mesh_icosphere(10);
@@ -211,6 +232,7 @@ int main(void) {
   ctx = t_context(NULL, NULL, 1);
   test_fold();
   test_noise();
+  test_creased_corner();
   test_smoothing();
   test_femur();
   batten_context_free(ctx);
