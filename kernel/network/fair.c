@@ -21,6 +21,7 @@
 
 #include "base/checked.h"
 #include "fair.h"
+#include "normals.h"
 
 enum {
   ITEMS_PER_PART = 4, /* facets at some 20 us at least */
@@ -428,10 +429,22 @@ static void job_free(fair_job *job) {
   state_free(job, &job->now);
 }
 
+/* Slopes of a network may bend normals further than those that made its tangents were let. */
+static void see_triangles(const net_topology *t, uint32_t i, net_node *node) {
+  double normal[3], u[3], form[3];
+  memcpy(normal, node->w, sizeof normal);
+  if (!net_normal_guard(t, i, normal)) return;
+  memcpy(u, node->u, sizeof u);
+  memcpy(form, node->x + 2, sizeof form);
+  net_frame(normal, u, node);
+  memcpy(node->x + 2, form, sizeof form);
+}
+
 /* The start: upright nodes within their constraints, inner points of least thin plate energy. */
 static void begin(fair_job *job, const net_node *nodes) {
   for (size_t i = 0; i < job->t->nodes; i++) {
     fair_node_upright(&nodes[i], &job->next.nodes[i]);
+    see_triangles(job->t, (uint32_t)i, &job->next.nodes[i]);
     fair_node_constrain(job->t->constraint ? &job->t->constraint[i] : NULL, &job->next.nodes[i]);
   }
   memset(job->next.inner, 0, job->t->faces * sizeof *job->next.inner);

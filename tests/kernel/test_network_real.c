@@ -134,6 +134,7 @@ static void test_noise(void) {
     judge(name, mesh, BATTEN_FILL_SS, 1e-8, irregular[n]);
     judge(name, mesh, BATTEN_FILL_DEGREE7, 1e-8, irregular[n]);
     judge(name, mesh, BATTEN_FILL_FAIR, 1e-8, irregular[n]);
+    judge(name, mesh, BATTEN_FILL_FAIR_LINEAR, 1e-8, irregular[n]);
     batten_mesh *less;
     T_OK(batten_mesh_decimate(ctx, mesh, 160, &less, NULL), ctx);
     snprintf(name, sizeof name, "of which %zu, %zu folded", batten_mesh_triangle_count(less), count_folded(less));
