@@ -33,8 +33,8 @@ static void compare(const char *name, const scene_mesh *m, batten_network_option
 
 static void forecasts(void) {
   scene_mesh scenes[] = {scene_mesh_octahedron(), scene_mesh_icosphere(6), scene_mesh_panel(),
-                         scene_mesh_icosphere(16)};
-  static const char *const names[] = {"octahedron", "icosphere 6", "panel", "icosphere 16"};
+                         scene_mesh_icosphere(10)};
+  static const char *const names[] = {"octahedron", "icosphere 6", "panel", "icosphere 10"};
   static const double slack[] = {10, 3, 4, 3};
   for (size_t s = 0; s < 4; s++) {
     for (size_t f = 0; f < sizeof fills / sizeof *fills; f++) {
