@@ -187,13 +187,19 @@ static double angle_about(const double *w, const double *a, const double *b) {
   return atan2(vec_dot(w, across), vec_dot(a, b));
 }
 
-/* Angle from d, the projected edge, to the projection of the edge from the same node to the vertex at `corner`, about
- * w or, turn -1, against it; pi when there is none. */
-static double gap(const net_topology *t, const double *p, const double *w, const double *d, double turn,
-                  uint32_t corner) {
+/* Angle from d, the projected edge, about w or, turn -1, against it, to the next one from the same node: of the
+ * triangle of x, where the node is at x's start or end. Its tangent where that is fixed, else its projection; pi when
+ * there is none. */
+static double gap(const net_topology *t, const double *p, const double *w, const double *d, double turn, uint32_t x,
+                  bool at_end) {
   double a[3], b[3];
-  if (corner == NET_NONE) return PI;
-  vec_sub(t->points + (size_t)3 * t->triangles[corner], p, a);
+  if (x == NET_NONE) return PI;
+  uint32_t next = at_end ? net_next(x) : net_prev(x), e = t->edge[next];
+  const double *guide = t->guide ? t->guide + 3 * (2 * (size_t)e + ((t->half[e] == next) != at_end)) : NULL;
+  if (guide && vec_dot(guide, guide) > 0)
+    memcpy(a, guide, sizeof a);
+  else
+    vec_sub(t->points + (size_t)3 * t->triangles[net_prev(x)], p, a);
   return project(a, w, b) ? turn * angle_about(w, d, b) : 0;
 }
 
@@ -204,14 +210,14 @@ static bool hold_order(const net_topology *t, const double *w, uint32_t e, unsig
                        double *d) {
   uint32_t h = t->half[e], twin = t->twin[h];
   const double *p = t->points + (size_t)3 * t->triangles[end ? net_next(h) : h];
-  uint32_t left = net_prev(h), right = twin == NET_NONE ? NET_NONE : net_prev(twin);
   double middle[3], v[3];
   if (!project(chord, w, middle)) return false;
   double turn = angle_about(w, middle, d);
   double sign = turn > 0 ? 1 : -1;
-  uint32_t ahead = (sign > 0) != end ? left : right, behind = (sign > 0) != end ? right : left;
-  double limit = gap(t, p, w, middle, sign, ahead);
-  if (behind != NET_NONE) limit = fmin(limit, PI - gap(t, p, w, middle, -sign, behind));
+  bool left = (sign > 0) != end;
+  uint32_t ahead = left ? h : twin, behind = left ? twin : h;
+  double limit = gap(t, p, w, middle, sign, ahead, left == end);
+  if (behind != NET_NONE) limit = fmin(limit, PI - gap(t, p, w, middle, -sign, behind, left != end));
   limit = ORDER_SHARE * fmax(limit, 0);
   if (fabs(turn) <= limit) return false;
   vec_cross(w, middle, v);
