@@ -5,23 +5,17 @@
  *   the three vertices, corrected by how the circles change along the crease;
  *   a single end in the mesh's inside is a dart: the surface closes around it and tells the direction;
  *   all others are corners: an end lies along the tangent of the circle that continues the edge's other end, or along
- *   the edge when that is no better known.
+ *   the edge when that is no better known; corners.c settles the rest.
  * The creases cut the fan of a vertex into sectors, which become the nodes. The tangents at its sides fix the plane
  * of a sector: wholly (NET_CORNER), or up to the turn about one line (NET_CREASED). The curvature of the crease,
  * which the surfaces on both sides share, is that of circles along its tangents through the next vertices. */
-#include "net.h"
+#include "features.h"
 
 #include "base/checked.h"
 
 #include <string.h>
 
 static const double RADIANS = 0.017453292519943295769;
-
-/* Tangents at the two sides of a sector say little of its plane when they are nearly opposite; and where two creases
- * meet at an angle, both sectors would have to lie in their plane, even if one is a wall across it. Mates are made of
- * ends that turn by less than STRAIGHT, and of those that turn by less than BENT and whose plane leaves the mean
- * plane of the sector's triangles by more than ASTRAY (radians: 3, 120, 45 degrees). */
-static const double STRAIGHT = 0.05, BENT = 2.1, ASTRAY = 0.8;
 
 /* Below this angle two tangents at a corner count as one. */
 static const double CUSP = 1e-6;
@@ -30,46 +24,7 @@ static const double CUSP = 1e-6;
  * turns by 60 degrees at every corner. */
 static const double SLACK = 1e-6;
 
-typedef struct features {
-  net_topology *t;
-  uint32_t *first;         /* [V] half-edge with which the fan of a vertex begins: creases do not end it */
-  uint32_t *mate;          /* [2 edges] by end: the end on which the curve goes on, or NET_NONE */
-  unsigned char *open;     /* [2 edges] non-zero: an end whose direction is free, at a dart */
-  uint32_t *ends;          /* [most triangles at a vertex + 1] ends at the vertex in hand, counter-clockwise */
-  unsigned char *straight; /* [as many] */
-  double *curvature;       /* [2 edges][3] scratch: curvature vectors at mates */
-  double corner_angle;
-} features;
-
 /* ---- ends --------------------------------------------------------------------------------------- */
-
-/* End 2 e + 0 is edge e at its start, 2 e + 1 at its end. */
-static uint32_t end_at_start(const net_topology *t, uint32_t h) {
-  return 2 * t->edge[h] + (t->half[t->edge[h]] != h);
-}
-static uint32_t end_at_end(const net_topology *t, uint32_t h) { return end_at_start(t, h) ^ 1; }
-
-static uint32_t end_vertex(const net_topology *t, uint32_t end) {
-  uint32_t h = t->half[end / 2];
-  return t->triangles[end % 2 ? net_next(h) : h];
-}
-
-/* From the end's vertex to the other. */
-static void end_chord(const net_topology *t, uint32_t end, double *out) {
-  vec_sub(t->points + 3 * (size_t)end_vertex(t, end ^ 1), t->points + 3 * (size_t)end_vertex(t, end), out);
-}
-
-static double angle_between(const double *a, const double *b) {
-  double c[3];
-  vec_cross(a, b, c);
-  return atan2(vec_norm(c), vec_dot(a, b));
-}
-
-/* The turn of a curve that comes in along a and goes out along b, both directions pointing out. */
-static double turn_between(const double *a, const double *b) {
-  double back[3] = {-a[0], -a[1], -a[2]};
-  return angle_between(back, b);
-}
 
 /* Tangent at the middle one of three vertices of their circle, from a towards b. False when there is none. */
 static bool circle_tangent(const net_topology *t, uint32_t a, uint32_t b, double *out) {
@@ -80,47 +35,6 @@ static bool circle_tangent(const net_topology *t, uint32_t a, uint32_t b, double
   for (int k = 0; k < 3; k++) out[k] = q[k] / qq - p[k] / pp;
   return vec_normalize(out);
 }
-
-static double chord_turn(const net_topology *t, uint32_t a, uint32_t b) {
-  double p[3], q[3];
-  end_chord(t, a, p);
-  end_chord(t, b, q);
-  return turn_between(p, q);
-}
-
-/* out = direction at one end of an arc over the chord whose other end leaves along d: its mirror image. */
-static void mirror(const double *chord, const double *d, double *out) {
-  double factor = 2 * vec_dot(d, chord) / vec_dot(chord, chord);
-  for (int k = 0; k < 3; k++) out[k] = d[k] - factor * chord[k];
-}
-
-/* a and b become mates with a common tangent that points out along b. */
-static void join_ends(features *f, uint32_t a, uint32_t b, const double *tangent) {
-  for (int k = 0; k < 3; k++) {
-    f->t->guide[3 * (size_t)a + (size_t)k] = -tangent[k];
-    f->t->guide[3 * (size_t)b + (size_t)k] = tangent[k];
-  }
-  f->mate[a] = b;
-  f->mate[b] = a;
-}
-
-/* The crease ends at v in f->ends; their number. */
-static size_t gather_ends(const features *f, uint32_t v) {
-  const net_topology *t = f->t;
-  size_t count = 0;
-  uint32_t h = f->first[v], next;
-  for (bool more = true; more; h = next) {
-    if (t->kind[t->edge[h]] == NET_CREASE) f->ends[count++] = end_at_start(t, h);
-    uint32_t in = net_prev(h);
-    next = t->twin[in];
-    more = next != NET_NONE && next != f->first[v];
-    if (next == NET_NONE && t->kind[t->edge[in]] == NET_CREASE) f->ends[count++] = end_at_end(t, in);
-  }
-  return count;
-}
-
-static bool is_on_boundary(const features *f, uint32_t v) { return f->t->twin[f->first[v]] == NET_NONE; }
-static bool is_boundary_edge(const net_topology *t, uint32_t e) { return t->twin[t->half[e]] == NET_NONE; }
 
 /* ---- which edges -------------------------------------------------------------------------------- */
 
@@ -181,15 +95,6 @@ static batten_status find_creases(batten_context *ctx, const features *f, const 
 /* ---- tangents ----------------------------------------------------------------------------------- */
 
 /* Mates and open ends at v; guides of mates. */
-/* Both ends belong to one triangle: with one tangent it would have to make half a turn between them, and be singular.
- */
-static bool share_triangle(const net_topology *t, uint32_t a, uint32_t b) {
-  uint32_t h = t->half[a / 2];
-  for (int side = 0; side < 2 && h != NET_NONE; side++, h = t->twin[h])
-    if (t->edge[net_next(h)] == b / 2 || t->edge[net_prev(h)] == b / 2) return true;
-  return false;
-}
-
 static void judge_vertex(features *f, uint32_t v) {
   size_t count = gather_ends(f, v);
   const uint32_t *ends = f->ends;
@@ -266,82 +171,6 @@ static void continue_ends(features *f) {
     else
       mirror(chord, t->guide + 3 * (size_t)(end ^ 1), guide);
     vec_normalize(guide);
-  }
-}
-
-/* Angle-weighted normal of the triangles from the side `end`, counter-clockwise, to the next crease. */
-static void sector_normal(const features *f, uint32_t end, double *out) {
-  const net_topology *t = f->t;
-  uint32_t h = t->half[end / 2];
-  if (end % 2) h = t->twin[h]; /* sectors do not begin at the end of a boundary edge's only half-edge */
-  out[0] = out[1] = out[2] = 0;
-  for (;;) {
-    const double *p = t->points + 3 * (size_t)t->triangles[h], *q = t->points + 3 * (size_t)t->triangles[net_next(h)],
-                 *r = t->points + 3 * (size_t)t->triangles[net_prev(h)];
-    double n[3], angle = vec_angle(p, q, r);
-    vec_triangle_normal(p, q, r, n);
-    vec_normalize(n);
-    for (int k = 0; k < 3; k++) out[k] += angle * n[k];
-    uint32_t in = net_prev(h);
-    if (t->twin[in] == NET_NONE || t->kind[t->edge[in]] == NET_CREASE) break;
-    h = t->twin[in];
-  }
-  vec_normalize(out);
-}
-
-/* How far the sector between two ends without mates turns, when its plane is better left to the triangles; else
- * INFINITY. */
-static double straightness(const features *f, uint32_t a, uint32_t b) {
-  if (f->mate[a] != NET_NONE || f->mate[b] != NET_NONE || share_triangle(f->t, a, b)) return INFINITY;
-  const double *p = f->t->guide + 3 * (size_t)a, *q = f->t->guide + 3 * (size_t)b;
-  double turn = turn_between(p, q), plane[3], normal[3];
-  if (turn < STRAIGHT) return turn;
-  if (turn > BENT) return INFINITY;
-  vec_cross(p, q, plane);
-  sector_normal(f, a, normal);
-  double astray = angle_between(plane, normal);
-  return fmin(astray, 180 * RADIANS - astray) > ASTRAY ? turn : INFINITY;
-}
-
-/* Ends that close in on each other go back to their edges, which stand apart. */
-static void part_ends(features *f, size_t count, size_t sectors) {
-  for (size_t i = 0; i < count; i++) f->straight[i] = 0;
-  for (size_t i = 0; i < sectors; i++) {
-    size_t side[2] = {i, (i + 1) % count};
-    double chord[2][3];
-    for (int s = 0; s < 2; s++) end_chord(f->t, f->ends[side[s]], chord[s]);
-    const double *p = f->t->guide + 3 * (size_t)f->ends[side[0]], *q = f->t->guide + 3 * (size_t)f->ends[side[1]];
-    if (angle_between(p, q) < 0.5 * angle_between(chord[0], chord[1]))
-      f->straight[side[0]] = f->straight[side[1]] = 1;
-  }
-  for (size_t i = 0; i < count; i++) {
-    double *guide = f->t->guide + 3 * (size_t)f->ends[i];
-    if (!f->straight[i]) continue;
-    end_chord(f->t, f->ends[i], guide);
-    vec_normalize(guide);
-  }
-}
-
-/* Where continued tangents leave a sector no clear plane: ends that oppose each other become mates, the straightest
- * first. */
-static void settle_corner(features *f, uint32_t v) {
-  size_t count = gather_ends(f, v), sectors = is_on_boundary(f, v) ? count - 1 : count;
-  if (count < 2 || f->mate[f->ends[0]] != NET_NONE) return;
-  part_ends(f, count, sectors);
-  for (;;) {
-    size_t best = count;
-    double least = INFINITY, tangent[3];
-    for (size_t i = 0; i < sectors; i++) {
-      double turn = straightness(f, f->ends[i], f->ends[(i + 1) % count]);
-      if (turn >= least) continue;
-      least = turn;
-      best = i;
-    }
-    if (best == count) return;
-    uint32_t a = f->ends[best], b = f->ends[(best + 1) % count];
-    vec_sub(f->t->guide + 3 * (size_t)b, f->t->guide + 3 * (size_t)a, tangent);
-    vec_normalize(tangent);
-    join_ends(f, a, b, tangent);
   }
 }
 
@@ -458,7 +287,8 @@ static batten_status make_creases(batten_context *ctx, features *f, const unsign
   for (uint32_t v = 0; v < t->vertices; v++) judge_vertex(f, v);
   refine_mates(f);
   continue_ends(f);
-  for (uint32_t v = 0; v < t->vertices; v++) settle_corner(f, v);
+  for (uint32_t v = 0; v < t->vertices; v++) net_settle_corner(f, v);
+  for (uint32_t v = 0; v < t->vertices; v++) net_split_walls(f, v);
   find_bends(f);
   return renumber_nodes(ctx, f);
 }

@@ -4,7 +4,8 @@
  *   topology.c   half-edges, edges, fans, nodes (one tangent plane each: a vertex, or a sector between creases);
  *                checks that name what is wrong
  *   bytes.c      the memory that a build will take
- *   features.c   creases, corners, boundary curves, polylines: fixed directions and curvatures
+ *   features.c   creases, corners, boundary curves, polylines: fixed directions and curvatures; corners.c: what
+ *                creases without a common tangent ask of the sectors between them; folds.c: edges out of order
  *   normals.c    estimated normals at the nodes
  *   tangent.c    D1, D2 and L1 .. L4: the local parameters t, s of an edge; curvature estimate
  *   g1.c         the 2N system and its iteration
@@ -85,7 +86,7 @@ batten_status net_topology_make(batten_context *ctx, size_t vertices, const doub
  * net_topology_free alone. The half-edges out of a vertex that have the same node are its fan, from node_first on;
  * one crease that ends inside the mesh does not cut it, and the fan then begins there. */
 batten_status net_features_make(batten_context *ctx, const batten_network_options *opt, net_topology *topology);
-/* Guides at nodes that are folded: see folds.c. */
+/* Guides at nodes that are folded, and in sectors whose edges are out of order: see folds.c. */
 batten_status net_folds_make(batten_context *ctx, net_topology *topology);
 void net_topology_free(batten_context *ctx, net_topology *topology);
 

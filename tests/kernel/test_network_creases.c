@@ -116,6 +116,148 @@ static void test_can(void) {
   }
 }
 
+/* ---- plates ------------------------------------------------------------------------------------- */
+
+enum { PLATE_MOST = 64 };
+typedef struct plate {
+  size_t points, triangles;
+  double xy[PLATE_MOST][2];
+  size_t corners[2 * PLATE_MOST][3]; /* counter-clockwise */
+  double area, slack;                /* of the shape that is meant, and what a curve through its points may miss */
+} plate;
+
+static void plate_triangle(plate *p, size_t a, size_t b, size_t c) {
+  size_t *out = p->corners[p->triangles++];
+  out[0] = a;
+  out[1] = b;
+  out[2] = c;
+}
+
+/* Bottom, top, and a wall on every side that has one triangle alone, its diagonals in turns. */
+static scene_mesh plate_mesh(const plate *p, double height) {
+  size_t sides = 0, count = 0, n = p->points;
+  unsigned char *inner = calloc(3 * p->triangles, 1);
+  for (size_t h = 0; h < 3 * p->triangles; h++) {
+    const size_t *a = p->corners[h / 3];
+    for (size_t g = 0; g < 3 * p->triangles; g++) {
+      const size_t *b = p->corners[g / 3];
+      if (a[h % 3] == b[(g + 1) % 3] && a[(h + 1) % 3] == b[g % 3]) inner[h] = 1;
+    }
+    sides += !inner[h];
+  }
+  scene_mesh m = scene_mesh_make(2 * n, 2 * p->triangles + 2 * sides);
+  for (size_t i = 0; i < 2 * n; i++)
+    scene_point_set(m.points + 3 * i, p->xy[i % n][0], p->xy[i % n][1], i < n ? 0 : height);
+  for (size_t f = 0; f < p->triangles; f++) {
+    const size_t *a = p->corners[f];
+    scene_triangle_set(m.corners + 3 * count++, a[0], a[2], a[1]);
+    scene_triangle_set(m.corners + 3 * count++, n + a[0], n + a[1], n + a[2]);
+  }
+  for (size_t h = 0; h < 3 * p->triangles; h++) {
+    if (inner[h]) continue;
+    size_t a = p->corners[h / 3][h % 3], b = p->corners[h / 3][(h + 1) % 3];
+    scene_triangle_set(m.corners + 3 * count++, a, b, h % 2 ? n + a : n + b);
+    scene_triangle_set(m.corners + 3 * count++, h % 2 ? b : a, n + b, n + a);
+  }
+  free(inner);
+  return m;
+}
+
+/* A disk without a vertex inside: a strip that goes to and fro has an ear at both ends; or a fan. */
+static plate disk(size_t n, bool fan) {
+  plate p = {.points = n, .area = SCENE_PI, .slack = 0.03};
+  for (size_t i = 0; i < n; i++) {
+    p.xy[i][0] = cos(2 * SCENE_PI * (double)i / (double)n);
+    p.xy[i][1] = sin(2 * SCENE_PI * (double)i / (double)n);
+  }
+  for (size_t i = 1, low = 0, high = n - 1; i + 1 < n; i++) {
+    if (fan) {
+      plate_triangle(&p, 0, i, i + 1);
+    } else if (i % 2) {
+      plate_triangle(&p, low, low + 1, high);
+      low++;
+    } else {
+      plate_triangle(&p, low, high - 1, high);
+      high--;
+    }
+  }
+  return p;
+}
+
+/* A ring that is hardly wider than its arcs are high: tangents of the rims point across its diagonals. */
+static plate ring(size_t n, double width) {
+  plate p = {.points = 2 * n, .area = SCENE_PI * (1 - (1 - width) * (1 - width)), .slack = 0.03};
+  for (size_t i = 0; i < n; i++) {
+    double a = 2 * SCENE_PI * (double)i / (double)n;
+    for (size_t k = 0; k < 2; k++) {
+      p.xy[i + k * n][0] = (k ? 1 - width : 1) * cos(a);
+      p.xy[i + k * n][1] = (k ? 1 - width : 1) * sin(a);
+    }
+    size_t j = (i + 1) % n;
+    plate_triangle(&p, i, j, n + i);
+    plate_triangle(&p, j, n + j, n + i);
+  }
+  return p;
+}
+
+/* A rectangle with an oblong hole: all edges go from its corners to the rim. */
+static plate slot(size_t quarter) {
+  plate p = {.points = 4 + 4 * quarter, .area = 6 * 4 - (2 * 2 + SCENE_PI), .slack = 0.01};
+  size_t n = 4 * quarter;
+  for (size_t i = 0; i < n; i++) {
+    double a = SCENE_PI * ((double)(i % (n / 2)) / ((double)n / 2 - 1) - 0.5), side = i < n / 2 ? 1 : -1;
+    p.xy[4 + i][0] = side * (1 + cos(a));
+    p.xy[4 + i][1] = side * sin(a);
+  }
+  for (size_t q = 0; q < 4; q++) {
+    p.xy[q][0] = q == 0 || q == 3 ? 3 : -3;
+    p.xy[q][1] = q < 2 ? 2 : -2;
+    for (size_t i = 0; i < quarter; i++) {
+      size_t from = ((q + 1) * quarter + i) % n;
+      plate_triangle(&p, q, 4 + (from + 1) % n, 4 + from);
+    }
+    plate_triangle(&p, q, (q + 1) % 4, 4 + (q + 2) * quarter % n);
+  }
+  return p;
+}
+
+static void test_plate(const char *name, const plate *p, size_t rims) {
+  for (int i = 0; i < FILLS; i++) {
+    scene_mesh m = plate_mesh(p, 0.8);
+    batten_network_options opt = batten_network_options_default();
+    batten_network_info info;
+    batten_network_measures size;
+    batten_network_continuity joints;
+    batten_status status;
+    opt.crease_angle_deg = 60;
+    opt.fill = fills[i];
+    batten_network *network = build(&m, &opt, &info, &status);
+    T_CHECK(status == BATTEN_OK && info.irregular_faces == 0, "%s, %s: %s, %zu creases", name, fill_names[i],
+            status ? batten_error(ctx) : "exact", info.crease_edges);
+    T_OK(batten_network_measure(ctx, network, &size), ctx);
+    T_OK(batten_network_measure_continuity(ctx, network, 9, &joints), ctx);
+    /* The fair fill gives walls a belly where their rims change curvature. */
+    bool fair = fills[i] == BATTEN_FILL_FAIR || fills[i] == BATTEN_FILL_FAIR_LINEAR;
+    T_RATIO(fabs(size.volume / (0.8 * p->area) - 1), fair ? 0.07 : p->slack, "volume %.4f", size.volume);
+    T_RATIO(joints.crease.gap_max, 1e-13, "creases closed");
+    T_CHECK(info.crease_edges >= rims && info.crease_edges <= rims + 4, "%zu creases, %zu without those at ears",
+            info.crease_edges, rims);
+    batten_network_free(network);
+    scene_mesh_free(&m);
+  }
+}
+
+static void test_plates(void) {
+  plate p = disk(16, false);
+  test_plate("disk, strip", &p, 32);
+  p = disk(16, true);
+  test_plate("disk, fan", &p, 32);
+  p = ring(25, 0.02);
+  test_plate("narrow ring", &p, 100);
+  p = slot(6);
+  test_plate("slot", &p, 60);
+}
+
 /* ---- boundary curves ---------------------------------------------------------------------------- */
 
 /* Greatest difference of the boundary curves of two networks over the same triangles. */
@@ -230,6 +372,7 @@ int main(void) {
   ctx = t_context(NULL, NULL, 2);
   test_blocks();
   test_can();
+  test_plates();
   test_boundary_curves();
   test_lines();
   batten_context_free(ctx);

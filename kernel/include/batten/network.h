@@ -111,10 +111,10 @@ BATTEN_API batten_network_options batten_network_options_default(void);
 typedef struct batten_network_info {
   batten_network_fill fill; /* that was taken */
   unsigned continuity;
-  size_t vertices, edges, faces, patches; /* vertices: those in use */
-  size_t boundary_edges, crease_edges, line_edges;
-  size_t nodes;    /* tangent planes: one a vertex, more where creases meet */
-  size_t unknowns; /* of the largest linear system */
+  size_t vertices, edges, faces, patches;          /* vertices: those in use */
+  size_t boundary_edges, crease_edges, line_edges; /* creases: those that walls at a corner needed, too */
+  size_t nodes;                                    /* tangent planes: one a vertex, more where creases meet */
+  size_t unknowns;                                 /* of the largest linear system */
   unsigned normal_passes;
   double normal_change_rad; /* largest turn in the last pass */
   size_t cg_iterations;     /* over all passes */
