@@ -1,20 +1,21 @@
 /* Minimum norm networks: what the parts of kernel/network share. The map of the folder:
  *
- *   network.c    the public call as a list of phases; options; figures
+ *   network.c    the public call as a list of phases; options.c: what may be asked; figures
  *   topology.c   half-edges, edges, fans, nodes (one tangent plane each: a vertex, or a sector between creases);
  *                checks that name what is wrong
  *   bytes.c      the memory that a build will take
  *   features.c   creases, corners, boundary curves, polylines: fixed directions and curvatures; corners.c: what
  *                creases without a common tangent ask of the sectors between them; folds.c: edges out of order
- *   normals.c    estimated normals at the nodes
+ *   normals.c    estimated normals at the nodes; node.c: frames, and what constraints leave free
  *   tangent.c    D1, D2 and L1 .. L4: the local parameters t, s of an edge; curvature estimate
  *   g1.c         the 2N system and its iteration
  *   g2.c         the 5N system; ribbon.c: curve and cross field of an edge from the data at its ends
- *   fill_*.c     one facet each: raw arrays in, control points out
+ *   fill_*.c     one facet each: raw arrays in, control points out; facet.c gathers what they need
  *   fair.c       the fair fill and its linear variant; fair_*.c
  *   surface.c    the handle; evaluate.c, tessellate.c, closest.c, measure.c, continuity.c, lines.c: know nothing of
  *                all above but the handle. For them: shape.c, normal and curvatures from derivatives; regular.c,
- *                proofs that a normal vanishes nowhere; patch_tree.c and box.c, boxes of patches and of the whole
+ *                proofs that a normal vanishes nowhere; patch_tree.c and box.c, boxes of patches and of the whole;
+ *                pattern.c, triangles between edges of unlike density
  *
  * Below network.c coordinates are scaled by a power of two, and shifted, so that the mesh's size is about 1:
  * constants may say so. Numerics take raw arrays and run on worker threads: no allocation, no context.

@@ -138,7 +138,7 @@ typedef struct batten_network_info {
  * are below 1e-12 of the size, and every facet is proven regular. Else BATTEN_W_ACCURACY, and the error text says
  * what was missed (PETERS and PN on all but the simplest meshes).
  * Same bits for any number of threads. Time O(F) for all but the direct solves.
- * Fails: INVALID (options; the mesh, with indices), NOMEM, TOO_LARGE, SINGULAR, CANCELLED. Since 0.2. */
+ * Fails: INVALID (options; the mesh, with indices), NOMEM, TOO_LARGE, SINGULAR, CANCELLED. */
 BATTEN_API batten_status batten_network_build(batten_context *ctx, const batten_mesh *mesh,
                                               const batten_network_options *opt, batten_network **out,
                                               batten_network_info *info);
