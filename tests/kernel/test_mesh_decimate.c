@@ -1,10 +1,10 @@
 /* Decimation: cubes and planes down to what they need, spheres and tori against their own surface, topology and
  * boundaries, what must not matter, what is refused. The result is always free of defects. */
+#include "femur.h"
 #include "network_scenes.h"
 #include "tap.h"
 
 #include <batten/mesh.h>
-#include <inttypes.h>
 
 #include "mesh_shapes.h"
 
@@ -196,25 +196,11 @@ static void test_refused(batten_context *ctx) {
 }
 
 static void test_femur(batten_context *ctx) {
-  const char *shared = getenv("BATTEN_SHARED");
-  char path[1024] = "";
-  if (shared) snprintf(path, sizeof path, "%s/data/meshes/femur.off", shared);
-  FILE *file = *path ? fopen(path, "r") : NULL;
-  size_t vertices = 0, triangles = 0;
-  if (!file || fscanf(file, "OFF %zu %zu %*u", &vertices, &triangles) != 2) {
+  scene_mesh m;
+  if (!femur_read(&m)) {
     t_skip("femur", "no data");
-    if (file) fclose(file);
     return;
   }
-  scene_mesh m = scene_mesh_make(vertices, triangles);
-  bool read = true;
-  for (size_t k = 0; k < 3 * vertices; k++) read = fscanf(file, "%lf", &m.points[k]) == 1 && read;
-  for (size_t t = 0; t < triangles; t++) {
-    uint32_t *c = m.corners + 3 * t;
-    read = fscanf(file, "%*u %" SCNu32 " %" SCNu32 " %" SCNu32, &c[0], &c[1], &c[2]) == 3 && read;
-  }
-  fclose(file);
-  T_CHECK(read, "femur: %zu vertices", vertices);
   batten_mesh_measures before, after;
   double distance = 0;
   batten_mesh *out = decimated(ctx, "femur", &m, 1000, &distance, &before, &after);

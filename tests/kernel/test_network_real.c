@@ -1,11 +1,11 @@
 /* Networks on rough meshes: scans, noise, folds. Where a mesh is folded no surface through it is fair; but joints are
  * exact all the same, and few facets are singular. */
 #include <batten/network.h>
-#include <inttypes.h>
 #include <string.h>
 
 #include "base/checked.h"
 #include "mesh/vec.h"
+#include "femur.h"
 #include "network_scenes.h"
 #include "tap.h"
 
@@ -185,24 +185,6 @@ static void test_smoothing(void) {
   batten_mesh_free(smooth);
   batten_mesh_free(mesh);
   scene_mesh_free(&m);
-}
-
-static bool femur_read(scene_mesh *out) {
-  const char *shared = getenv("BATTEN_SHARED");
-  char path[1024] = "";
-  if (shared) snprintf(path, sizeof path, "%s/data/meshes/femur.off", shared);
-  FILE *file = *path ? fopen(path, "r") : NULL;
-  size_t vertices = 0, triangles = 0;
-  if (!file) return false;
-  bool read = fscanf(file, "OFF %zu %zu %*u", &vertices, &triangles) == 2;
-  if (read) *out = scene_mesh_make(vertices, triangles);
-  for (size_t k = 0; read && k < 3 * vertices; k++) read = fscanf(file, "%lf", &out->points[k]) == 1;
-  for (size_t t = 0; read && t < triangles; t++) {
-    uint32_t *c = out->corners + 3 * t;
-    read = fscanf(file, "%*u %" SCNu32 " %" SCNu32 " %" SCNu32, &c[0], &c[1], &c[2]) == 3;
-  }
-  fclose(file);
-  return read;
 }
 
 static void test_femur(void) {
