@@ -67,7 +67,7 @@ static void number_edges(bx_brep *b, edge_key *keys) {
   for (uint32_t h = 0; h < halves; h++) {
     uint32_t from = corner(b, h, 0), to = corner(b, h, 1);
     keys[h] = (edge_key){from < to ? from : to, from < to ? to : from, h};
-    b->edge[h] = h; /* the half-edge with which it makes an edge, for now */
+    b->edge[h] = h; /* until it is numbered: the half-edge with which it makes an edge */
   }
   qsort(keys, halves, sizeof *keys, compare_keys);
   for (size_t i = 0; i < halves;) {

@@ -82,13 +82,13 @@ typedef struct batten_network_options {
                                     with creases. */
   unsigned normal_passes;        /* most passes of optimisation; 0 keeps the normals. Default 30. */
   double normal_tol_rad;         /* stop when no normal turns by more, radians. Default 1e-6. */
-  batten_network_direction direction;
-  batten_network_length length;
-  batten_network_functional functional;
+  batten_network_direction direction;   /* default D2 */
+  batten_network_length length;         /* default L2 */
+  batten_network_functional functional; /* default SIMPLE */
   double weight_power; /* edges count |E|^-weight_power, 0 .. 6; with LAPLACE_BELTRAMI |E|^(3 - weight_power), which
                           weighs alike. Default 3; the paper has 0. */
   double field_weight; /* of the cross-boundary field in the 5N system, >= 0. Default 0.32. */
-  batten_network_solver solver;
+  batten_network_solver solver; /* default AUTO */
 
   double crease_angle_deg;       /* edges whose triangles' normals differ by more are creases; 0 = none. Default 0. */
   size_t crease_count;           /* further creases */
@@ -119,8 +119,8 @@ typedef struct batten_network_info {
   double normal_change_rad; /* largest turn in the last pass */
   size_t cg_iterations;     /* over all passes */
   double residual;          /* of the last linear system, relative */
-  size_t fallback_faces;    /* DEGREE7: facets that took DEGREE6 */
-  size_t clamped_faces;     /* facets where a degenerate case of a formula was met by its stated substitute */
+  size_t fallback_faces;    /* DEGREE7, FAIR, FAIR_LINEAR: facets that took DEGREE6 */
+  size_t clamped_faces;     /* edges, and facets of SS, where a degenerate case was met by its stated substitute */
   unsigned fairing_passes;
   double energy_start, energy; /* FAIR: integral of |grad II|^2; else the functional of the network; caller's unit */
   double normal_jump_max_deg, normal_jump_rms_deg; /* over smooth edges and inside facets; NaN when not measured */
