@@ -25,7 +25,7 @@ static const double QUALITY_MIN = 0.3; /* changes make no triangle worse than th
 enum { FLIP_SWEEPS = 4, VALENCE_MAX = 12 };
 
 typedef struct improver {
-  batten_surface *s;
+  mesh_surface *s;
   batten_sampler *sampler;
   const double *lower, *upper; /* the box */
   double edge;
@@ -33,8 +33,8 @@ typedef struct improver {
   size_t room;                         /* vertices that they hold */
 } improver;
 
-static double *point(const batten_surface *s, uint32_t v) { return s->points + 3 * (size_t)v; }
-static double *normal(const batten_surface *s, uint32_t v) { return s->normals + 3 * (size_t)v; }
+static double *point(const mesh_surface *s, uint32_t v) { return s->points + 3 * (size_t)v; }
+static double *normal(const mesh_surface *s, uint32_t v) { return s->normals + 3 * (size_t)v; }
 
 /* ---- what a change does to a triangle ----------------------------------------------------------- */
 
@@ -77,27 +77,27 @@ static bool may_become(const facet *before, const facet *after) {
 
 /* ---- split and collapse ------------------------------------------------------------------------- */
 
-static double edge_length(const batten_surface *s, uint32_t h) {
+static double edge_length(const mesh_surface *s, uint32_t h) {
   return vec_distance(point(s, s->origin[h]), point(s, s->origin[mesh_next(h)]));
 }
 
 static batten_status split_long(improver *im) {
-  batten_surface *s = im->s;
+  mesh_surface *s = im->s;
   for (uint32_t h = 0; h < 3 * s->triangle_count; h++) { /* halves come later in the same loop */
     if (s->origin[h] == MESH_NONE || !(edge_length(s, h) > LONG_EDGE * im->edge)) continue;
     const double *a = point(s, s->origin[h]), *b = point(s, s->origin[mesh_next(h)]);
     double middle[3];
     for (int k = 0; k < 3; k++) middle[k] = 0.5 * a[k] + 0.5 * b[k];
-    if (batten_surface_split(s, h, middle) == MESH_NONE) return BATTEN_E_NOMEM;
+    if (mesh_surface_split(s, h, middle) == MESH_NONE) return BATTEN_E_NOMEM;
   }
   return BATTEN_OK;
 }
 
 /* May the triangles of v, but those that also have `other`, have v at x with the normal n? */
 static bool ring_allows(const improver *im, uint32_t v, uint32_t other, const double *x, const double *n) {
-  const batten_surface *s = im->s;
+  const mesh_surface *s = im->s;
   uint32_t ring[SURFACE_RING_MAX];
-  size_t count = batten_surface_ring(s, v, ring);
+  size_t count = mesh_surface_ring(s, v, ring);
   for (size_t i = 0; i < count; i++) {
     uint32_t p = s->origin[mesh_next(ring[i])], q = s->origin[mesh_previous(ring[i])];
     if (p == other || q == other) continue;
@@ -113,10 +113,10 @@ static bool ring_allows(const improver *im, uint32_t v, uint32_t other, const do
 
 /* Draws the origin of h into its end when that is allowed; to the middle where both may move. */
 static bool try_collapse(improver *im, uint32_t h) {
-  batten_surface *s = im->s;
+  mesh_surface *s = im->s;
   uint32_t a = s->origin[h], b = s->origin[mesh_next(h)];
   if (s->faces[a] & ~s->faces[b]) return false; /* would leave a face of the box */
-  if (!batten_surface_may_collapse(s, h)) return false;
+  if (!mesh_surface_may_collapse(s, h)) return false;
   bool even = s->faces[a] == s->faces[b];
   double x[3], n[3];
   for (int k = 0; k < 3; k++) {
@@ -125,14 +125,14 @@ static bool try_collapse(improver *im, uint32_t h) {
   }
   vec_normalize(n);
   if (!ring_allows(im, a, b, x, n) || (even && !ring_allows(im, b, a, x, n))) return false;
-  batten_surface_collapse(s, h);
+  mesh_surface_collapse(s, h);
   memcpy(point(s, b), x, sizeof x);
   memcpy(normal(s, b), n, sizeof n);
   return true;
 }
 
 static void collapse_short(improver *im) {
-  batten_surface *s = im->s;
+  mesh_surface *s = im->s;
   for (uint32_t h = 0; h < 3 * s->triangle_count; h++) {
     if (s->origin[h] == MESH_NONE || !(edge_length(s, h) < SHORT_EDGE * im->edge)) continue;
     if (!try_collapse(im, h) && s->twin[h] != MESH_NONE) try_collapse(im, s->twin[h]);
@@ -159,7 +159,7 @@ static double opposite_angles(const double *a, const double *b, const double *c,
 
 /* An edge is turned when the angles opposite to it add up to more than pi (not Delaunay), the two triangles lie about
  * flat or get flatter by it, and both new ones face outward. */
-static bool wants_flip(const batten_surface *s, uint32_t h) {
+static bool wants_flip(const mesh_surface *s, uint32_t h) {
   uint32_t g = s->twin[h];
   if (g == MESH_NONE || h > g) return false;
   uint32_t v[4] = {s->origin[h], s->origin[g], s->origin[mesh_previous(h)], s->origin[mesh_previous(g)]};
@@ -176,12 +176,12 @@ static bool wants_flip(const batten_surface *s, uint32_t h) {
 }
 
 static void flip_sweeps(improver *im) {
-  batten_surface *s = im->s;
+  mesh_surface *s = im->s;
   for (int sweep = 0; sweep < FLIP_SWEEPS; sweep++) {
     size_t flips = 0;
     for (uint32_t h = 0; h < 3 * s->triangle_count; h++) {
-      if (s->origin[h] == MESH_NONE || !wants_flip(s, h) || !batten_surface_may_flip(s, h)) continue;
-      batten_surface_flip(s, h);
+      if (s->origin[h] == MESH_NONE || !wants_flip(s, h) || !mesh_surface_may_flip(s, h)) continue;
+      mesh_surface_flip(s, h);
       flips++;
     }
     if (flips == 0) return;
@@ -199,9 +199,9 @@ static void keep_on_faces(unsigned char faces, double *d) {
 /* Where v should go along the surface: towards the mean of its neighbours; on the box, of its two neighbours there.
  */
 static void smooth_target(const improver *im, uint32_t v, double *x) {
-  const batten_surface *s = im->s;
+  const mesh_surface *s = im->s;
   uint32_t around[SURFACE_RING_MAX + 1];
-  size_t count = batten_surface_neighbours(s, v, around), used = 0;
+  size_t count = mesh_surface_neighbours(s, v, around), used = 0;
   double d[3] = {0, 0, 0}, n[3];
   memcpy(x, point(s, v), sizeof d);
   for (size_t i = 0; i < count; i++) {
@@ -245,7 +245,7 @@ static bool in_box(const improver *im, const double *x) {
 
 /* One pass over all vertices of the compacted surface; on_field: back to f = 0 after the move along the surface. */
 static batten_status smooth(improver *im, bool on_field) {
-  batten_surface *s = im->s;
+  mesh_surface *s = im->s;
   batten_status st = make_room(im);
   if (st < 0) return st;
   for (uint32_t v = 0; v < s->vertex_count; v++) smooth_target(im, v, im->target + 3 * (size_t)v);
@@ -268,8 +268,8 @@ static batten_status smooth(improver *im, bool on_field) {
   return BATTEN_OK;
 }
 
-batten_status batten_surface_improve(batten_surface *s, batten_sampler *sampler, const double *lower,
-                                     const double *upper, double edge, unsigned rounds) {
+batten_status mesh_surface_improve(mesh_surface *s, batten_sampler *sampler, const double *lower, const double *upper,
+                                   double edge, unsigned rounds) {
   improver im = {.s = s, .sampler = sampler, .lower = lower, .upper = upper, .edge = edge};
   batten_status st = BATTEN_OK;
   for (unsigned round = 0; st >= 0 && round < rounds; round++) {
@@ -278,7 +278,7 @@ batten_status batten_surface_improve(batten_surface *s, batten_sampler *sampler,
     if (st < 0) break;
     collapse_short(&im);
     flip_sweeps(&im);
-    st = batten_surface_compact(s);
+    st = mesh_surface_compact(s);
     if (st >= 0) st = smooth(&im, round % 2 == 0 || round + 1 == rounds);
     if (st >= 0) flip_sweeps(&im);
   }
@@ -290,8 +290,8 @@ batten_status batten_surface_improve(batten_surface *s, batten_sampler *sampler,
 
 /* ---- settling on f = 0 -------------------------------------------------------------------------- */
 
-batten_status batten_surface_settle(batten_surface *s, batten_sampler *sampler, double edge, double tolerance,
-                                    double *distance_max) {
+batten_status mesh_surface_settle(mesh_surface *s, batten_sampler *sampler, double edge, double tolerance,
+                                  double *distance_max) {
   double *distance = batten_alloc_array(s->ctx, s->vertex_count, sizeof *distance), worst = 0;
   if (!distance) return BATTEN_E_NOMEM;
   batten_status st = batten_project_points(sampler, s->vertex_count, s->points, s->faces, REACH * edge, tolerance,

@@ -7,12 +7,12 @@
 
 /* Rounds of split, collapse, flip and tangential smoothing towards edges of the length `edge`; every second one ends
  * with a Newton step on the field. Vertices stay in the box. */
-batten_status batten_surface_improve(batten_surface *s, batten_sampler *sampler, const double *lower,
-                                     const double *upper, double edge, unsigned rounds);
+batten_status mesh_surface_improve(mesh_surface *s, batten_sampler *sampler, const double *lower, const double *upper,
+                                   double edge, unsigned rounds);
 
 /* Puts every vertex on f = 0 to |f| / |grad f| <= tolerance; *distance_max: what is left. Vertices move at most by
  * about `edge`, those on the box within its faces. */
-batten_status batten_surface_settle(batten_surface *s, batten_sampler *sampler, double edge, double tolerance,
-                                    double *distance_max);
+batten_status mesh_surface_settle(mesh_surface *s, batten_sampler *sampler, double edge, double tolerance,
+                                  double *distance_max);
 
 #endif

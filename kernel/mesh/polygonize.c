@@ -175,7 +175,7 @@ batten_status batten_polygonize_warn(batten_context *ctx, const batten_polygoniz
 /* One attempt: *surface is a mesh with edges of about `edge`, from a lattice of cubes with the side `cube`. */
 static batten_status attempt(batten_sampler *sampler, const batten_frame *frame, double cube, double edge,
                              size_t seed_count, const double *seeds, const batten_polygonize_options *opt,
-                             batten_surface *surface, batten_polygonize_info *info) {
+                             mesh_surface *surface, batten_polygonize_info *info) {
   batten_rough_surface rough = {0};
   double start = batten_now();
   batten_status st = batten_track_surface(sampler, frame->lower, frame->upper, cube, seed_count, seeds, &rough);
@@ -186,10 +186,9 @@ static batten_status attempt(batten_sampler *sampler, const batten_frame *frame,
   info->seeds_missed = rough.seeds_missed;
   info->clipped = 0;
   for (size_t v = 0; v < rough.vertex_count; v++) info->clipped = info->clipped || rough.faces[v];
-  st = batten_surface_build(sampler->ctx, &rough, surface);
-  if (st >= 0) st = batten_surface_improve(surface, sampler, frame->lower, frame->upper, edge, opt->improve);
-  if (st >= 0)
-    st = batten_surface_settle(surface, sampler, edge, opt->accuracy * frame->diagonal, &info->distance_max);
+  st = mesh_surface_build(sampler->ctx, &rough, surface);
+  if (st >= 0) st = mesh_surface_improve(surface, sampler, frame->lower, frame->upper, edge, opt->improve);
+  if (st >= 0) st = mesh_surface_settle(surface, sampler, edge, opt->accuracy * frame->diagonal, &info->distance_max);
   if (st >= 0)
     st = batten_mesh_find_crossings(sampler->ctx, surface->vertex_count, surface->points, surface->triangle_count,
                                     surface->origin, NULL, &info->self_intersections);
@@ -200,12 +199,12 @@ static batten_status attempt(batten_sampler *sampler, const batten_frame *frame,
 /* A surface that crosses itself has parts too thin for the lattice: again with cubes of half the side, and at last
  * with shorter edges too. */
 static batten_status make_surface(batten_sampler *sampler, const batten_frame *frame, size_t seed_count,
-                                  const double *seeds, const batten_polygonize_options *opt, batten_surface *surface,
+                                  const double *seeds, const batten_polygonize_options *opt, mesh_surface *surface,
                                   batten_polygonize_info *info) {
   static const double cube_share[] = {1, 0.5, 0.25}, edge_share[] = {1, 1, 0.5};
   batten_status st = BATTEN_OK;
   for (size_t i = 0; i < sizeof cube_share / sizeof *cube_share; i++) {
-    batten_surface_free(surface);
+    mesh_surface_free(surface);
     st = attempt(sampler, frame, CUBE_EDGES * cube_share[i] * frame->cell, edge_share[i] * frame->cell, seed_count,
                  seeds, opt, surface, info);
     if (st < 0 || info->self_intersections == 0 || opt->improve == 0) break;
@@ -222,14 +221,14 @@ batten_status batten_polygonize(batten_context *ctx, const batten_field *field, 
   batten_status st = batten_polygonize_frame(ctx, 3, field, seed_count, seeds, &o, out, &frame);
   if (st < 0) return st;
   batten_polygonize_info found = {.cell = frame.cell};
-  batten_surface surface = {.ctx = ctx};
+  mesh_surface surface = {.ctx = ctx};
   batten_sampler sampler = {
       .ctx = ctx, .field = field, .evaluations_max = o.evaluations_max, .difference = BATTEN_DIFFERENCE * frame.cell};
   st = make_surface(&sampler, &frame, seed_count, seeds, &o, &surface, &found);
   found.evaluations = sampler.evaluations;
   if (st >= 0)
     st = batten_mesh_create(ctx, surface.vertex_count, surface.points, surface.triangle_count, surface.origin, out);
-  batten_surface_free(&surface);
+  mesh_surface_free(&surface);
   if (st < 0) return st;
   if (info) *info = found;
   return batten_polygonize_warn(ctx, &found, o.accuracy * frame.diagonal);

@@ -6,23 +6,23 @@
 
 #include <string.h>
 
-void batten_surface_free(batten_surface *s) {
+void mesh_surface_free(mesh_surface *s) {
   batten_free(s->ctx, s->points);
   batten_free(s->ctx, s->normals);
   batten_free(s->ctx, s->faces);
   batten_free(s->ctx, s->out);
   batten_free(s->ctx, s->origin);
   batten_free(s->ctx, s->twin);
-  *s = (batten_surface){.ctx = s->ctx};
+  *s = (mesh_surface){.ctx = s->ctx};
 }
 
-static void set_twins(batten_surface *s, uint32_t h, uint32_t g) {
+static void set_twins(mesh_surface *s, uint32_t h, uint32_t g) {
   if (h != MESH_NONE) s->twin[h] = g;
   if (g != MESH_NONE) s->twin[g] = h;
 }
 
 /* Turns back clockwise from half-edge h as far as it goes, and makes that the first of its origin. */
-static void set_first(batten_surface *s, uint32_t h) {
+static void set_first(mesh_surface *s, uint32_t h) {
   uint32_t first = h;
   while (s->twin[h] != MESH_NONE) {
     h = mesh_next(s->twin[h]);
@@ -33,7 +33,7 @@ static void set_first(batten_surface *s, uint32_t h) {
 
 /* ---- building ----------------------------------------------------------------------------------- */
 
-static void set_normals(batten_surface *s) {
+static void set_normals(mesh_surface *s) {
   memset(s->normals, 0, s->vertex_count * 3 * sizeof *s->normals);
   for (size_t t = 0; t < s->triangle_count; t++) {
     const uint32_t *v = s->origin + 3 * t;
@@ -45,7 +45,7 @@ static void set_normals(batten_surface *s) {
   for (size_t v = 0; v < s->vertex_count; v++) vec_normalize(s->normals + 3 * v);
 }
 
-static batten_status pair_half_edges(batten_surface *s, const uint32_t *order) {
+static batten_status pair_half_edges(mesh_surface *s, const uint32_t *order) {
   size_t half_edges = 3 * s->triangle_count;
   for (size_t i = 0; i < half_edges; i++) {
     uint32_t h = order[i], g = i + 1 < half_edges ? order[i + 1] : h;
@@ -65,8 +65,8 @@ static batten_status pair_half_edges(batten_surface *s, const uint32_t *order) {
   return BATTEN_OK;
 }
 
-batten_status batten_surface_build(batten_context *ctx, batten_rough_surface *rough, batten_surface *out) {
-  batten_surface s = {.ctx = ctx, .vertex_count = rough->vertex_count, .triangle_count = rough->triangle_count};
+batten_status mesh_surface_build(batten_context *ctx, batten_rough_surface *rough, mesh_surface *out) {
+  mesh_surface s = {.ctx = ctx, .vertex_count = rough->vertex_count, .triangle_count = rough->triangle_count};
   batten_status st = BATTEN_E_NOMEM;
   s.points = rough->vertices;
   s.faces = rough->faces;
@@ -86,14 +86,14 @@ batten_status batten_surface_build(batten_context *ctx, batten_rough_surface *ro
   set_normals(&s);
   *out = s;
 done:
-  if (st < 0) batten_surface_free(&s);
+  if (st < 0) mesh_surface_free(&s);
   batten_free(ctx, order);
   return st;
 }
 
 /* ---- rings -------------------------------------------------------------------------------------- */
 
-size_t batten_surface_ring(const batten_surface *s, uint32_t v, uint32_t *half_edges) {
+size_t mesh_surface_ring(const mesh_surface *s, uint32_t v, uint32_t *half_edges) {
   uint32_t first = s->out[v], h = first;
   size_t count = 0;
   do {
@@ -104,20 +104,20 @@ size_t batten_surface_ring(const batten_surface *s, uint32_t v, uint32_t *half_e
   return count;
 }
 
-size_t batten_surface_neighbours(const batten_surface *s, uint32_t v, uint32_t *vertices) {
+size_t mesh_surface_neighbours(const mesh_surface *s, uint32_t v, uint32_t *vertices) {
   uint32_t ring[SURFACE_RING_MAX];
-  size_t count = batten_surface_ring(s, v, ring);
+  size_t count = mesh_surface_ring(s, v, ring);
   for (size_t i = 0; i < count; i++) vertices[i] = s->origin[mesh_next(ring[i])];
-  if (count && batten_surface_on_boundary(s, v)) {
+  if (count && mesh_surface_on_boundary(s, v)) {
     vertices[count] = s->origin[mesh_previous(ring[count - 1])];
     count++;
   }
   return count;
 }
 
-static bool are_neighbours(const batten_surface *s, uint32_t a, uint32_t b) {
+static bool are_neighbours(const mesh_surface *s, uint32_t a, uint32_t b) {
   uint32_t around[SURFACE_RING_MAX + 1];
-  size_t count = batten_surface_neighbours(s, a, around);
+  size_t count = mesh_surface_neighbours(s, a, around);
   for (size_t i = 0; i < count; i++)
     if (around[i] == b) return true;
   return count == 0; /* not known */
@@ -125,7 +125,7 @@ static bool are_neighbours(const batten_surface *s, uint32_t a, uint32_t b) {
 
 /* ---- split -------------------------------------------------------------------------------------- */
 
-static batten_status make_room(batten_surface *s) {
+static batten_status make_room(mesh_surface *s) {
   size_t v = s->vertex_count + 1, h = 3 * s->triangle_count + 6;
   batten_context *ctx = s->ctx;
   if (v >= UINT32_MAX || h >= UINT32_MAX)
@@ -142,7 +142,7 @@ static batten_status make_room(batten_surface *s) {
 }
 
 /* The half at the end of h (a -> b, apex c) becomes the new triangle m b c: returns its half-edge m -> b. */
-static uint32_t split_half(batten_surface *s, uint32_t h, uint32_t m) {
+static uint32_t split_half(mesh_surface *s, uint32_t h, uint32_t m) {
   uint32_t hn = mesh_next(h), n = 3 * (uint32_t)s->triangle_count++;
   uint32_t b = s->origin[hn], c = s->origin[mesh_next(hn)];
   s->origin[n] = m;
@@ -155,7 +155,7 @@ static uint32_t split_half(batten_surface *s, uint32_t h, uint32_t m) {
   return n;
 }
 
-uint32_t batten_surface_split(batten_surface *s, uint32_t h, const double *x) {
+uint32_t mesh_surface_split(mesh_surface *s, uint32_t h, const double *x) {
   if (make_room(s) < 0) return MESH_NONE;
   uint32_t m = (uint32_t)s->vertex_count++, g = s->twin[h], a = s->origin[h], b = s->origin[mesh_next(h)];
   memcpy(s->points + 3 * (size_t)m, x, 3 * sizeof *x);
@@ -175,12 +175,12 @@ uint32_t batten_surface_split(batten_surface *s, uint32_t h, const double *x) {
 
 /* ---- collapse ----------------------------------------------------------------------------------- */
 
-bool batten_surface_may_collapse(const batten_surface *s, uint32_t h) {
+bool mesh_surface_may_collapse(const mesh_surface *s, uint32_t h) {
   uint32_t g = s->twin[h], a = s->origin[h], b = s->origin[mesh_next(h)], around_a[SURFACE_RING_MAX + 1],
            around_b[SURFACE_RING_MAX + 1];
-  bool a_edge = batten_surface_on_boundary(s, a), b_edge = batten_surface_on_boundary(s, b);
+  bool a_edge = mesh_surface_on_boundary(s, a), b_edge = mesh_surface_on_boundary(s, b);
   if (a_edge && (g != MESH_NONE || !b_edge)) return false;
-  size_t na = batten_surface_neighbours(s, a, around_a), nb = batten_surface_neighbours(s, b, around_b), common = 0;
+  size_t na = mesh_surface_neighbours(s, a, around_a), nb = mesh_surface_neighbours(s, b, around_b), common = 0;
   if (na == 0 || nb == 0 || na + nb > SURFACE_RING_MAX) return false;
   for (size_t i = 0; i < na; i++)
     for (size_t j = 0; j < nb; j++) common += around_a[i] == around_b[j];
@@ -188,14 +188,14 @@ bool batten_surface_may_collapse(const batten_surface *s, uint32_t h) {
   uint32_t apexes[2] = {s->origin[mesh_previous(h)], g == MESH_NONE ? MESH_NONE : s->origin[mesh_previous(g)]};
   for (int i = 0; i < 2 && apexes[i] != MESH_NONE; i++) { /* they lose a neighbour, and need two triangles or three */
     uint32_t around[SURFACE_RING_MAX + 1];
-    size_t n = batten_surface_neighbours(s, apexes[i], around);
-    if (n == 0 || n < (batten_surface_on_boundary(s, apexes[i]) ? 3u : 4u)) return false;
+    size_t n = mesh_surface_neighbours(s, apexes[i], around);
+    if (n == 0 || n < (mesh_surface_on_boundary(s, apexes[i]) ? 3u : 4u)) return false;
   }
   return true;
 }
 
 /* Takes the triangle of h (a -> b, apex c) away: the triangles beyond its other two sides become neighbours. */
-static void close_gap(batten_surface *s, uint32_t h) {
+static void close_gap(mesh_surface *s, uint32_t h) {
   uint32_t hn = mesh_next(h), hp = mesh_previous(h), c = s->origin[hp];
   uint32_t cb = s->twin[hn], ac = s->twin[hp];
   if (cb != MESH_NONE) s->twin[cb] = ac;
@@ -204,9 +204,9 @@ static void close_gap(batten_surface *s, uint32_t h) {
   s->origin[h] = s->origin[hn] = s->origin[hp] = MESH_NONE;
 }
 
-void batten_surface_collapse(batten_surface *s, uint32_t h) {
+void mesh_surface_collapse(mesh_surface *s, uint32_t h) {
   uint32_t ring[SURFACE_RING_MAX], g = s->twin[h], a = s->origin[h], b = s->origin[mesh_next(h)];
-  size_t count = batten_surface_ring(s, a, ring);
+  size_t count = mesh_surface_ring(s, a, ring);
   /* Of the half-edges around, these two leave b or a afterwards. */
   uint32_t beyond[4] = {s->twin[mesh_previous(h)], s->twin[mesh_next(h)], MESH_NONE, MESH_NONE};
   if (g != MESH_NONE) {
@@ -228,20 +228,20 @@ void batten_surface_collapse(batten_surface *s, uint32_t h) {
 
 /* ---- flip --------------------------------------------------------------------------------------- */
 
-bool batten_surface_may_flip(const batten_surface *s, uint32_t h) {
+bool mesh_surface_may_flip(const mesh_surface *s, uint32_t h) {
   uint32_t g = s->twin[h];
   if (g == MESH_NONE) return false;
   uint32_t a = s->origin[h], b = s->origin[g], c = s->origin[mesh_previous(h)], d = s->origin[mesh_previous(g)];
   uint32_t around[SURFACE_RING_MAX + 1];
   uint32_t ends[2] = {a, b};
   for (int i = 0; i < 2; i++) {
-    size_t n = batten_surface_neighbours(s, ends[i], around);
-    if (n == 0 || n < (batten_surface_on_boundary(s, ends[i]) ? 3u : 4u)) return false;
+    size_t n = mesh_surface_neighbours(s, ends[i], around);
+    if (n == 0 || n < (mesh_surface_on_boundary(s, ends[i]) ? 3u : 4u)) return false;
   }
   return c != d && !are_neighbours(s, c, d);
 }
 
-void batten_surface_flip(batten_surface *s, uint32_t h) {
+void mesh_surface_flip(mesh_surface *s, uint32_t h) {
   uint32_t hn = mesh_next(h), hp = mesh_previous(h), g = s->twin[h], gn = mesh_next(g), gp = mesh_previous(g);
   uint32_t a = s->origin[h], b = s->origin[g], c = s->origin[hp], d = s->origin[gp];
   uint32_t bc = s->twin[hn], ca = s->twin[hp], ad = s->twin[gn], db = s->twin[gp];
@@ -265,7 +265,7 @@ void batten_surface_flip(batten_surface *s, uint32_t h) {
 
 /* ---- compaction --------------------------------------------------------------------------------- */
 
-batten_status batten_surface_compact(batten_surface *s) {
+batten_status mesh_surface_compact(mesh_surface *s) {
   uint32_t vertices = 0, triangles = 0;
   uint32_t *number = batten_alloc_array(s->ctx, s->vertex_count + s->triangle_count, sizeof *number);
   if (!number) return BATTEN_E_NOMEM;

@@ -3,7 +3,7 @@
  * Half-edge 3 t + k belongs to triangle t, which lies on its left. twin[h] is the half-edge back, or MESH_NONE on
  * the boundary. out[v] is a half-edge that leaves v; for a vertex on the boundary the one without twin, so that
  * turning counter-clockwise from there meets all triangles of v. Removed triangles and vertices keep their numbers
- * until batten_surface_compact: origin[3 t] or out[v] is MESH_NONE. */
+ * until mesh_surface_compact: origin[3 t] or out[v] is MESH_NONE. */
 #ifndef BATTEN_MESH_SURFACE_H
 #define BATTEN_MESH_SURFACE_H
 
@@ -14,7 +14,7 @@
 
 enum { SURFACE_RING_MAX = 32 }; /* triangles at a vertex that operations look at; more are left alone */
 
-typedef struct batten_surface {
+typedef struct mesh_surface {
   batten_context *ctx;
   size_t vertex_count, triangle_count;
   double *points, *normals; /* [V][3]; normals: unit, outward, 0 = not known */
@@ -22,34 +22,34 @@ typedef struct batten_surface {
   uint32_t *out;            /* [V] */
   uint32_t *origin, *twin;  /* [3 T] */
   size_t points_capacity, normals_capacity, faces_capacity, out_capacity, origin_capacity, twin_capacity;
-} batten_surface;
+} mesh_surface;
 
 /* Takes over the arrays of rough, which is emptied. INTERNAL when it is no oriented manifold. */
-batten_status batten_surface_build(batten_context *ctx, batten_rough_surface *rough, batten_surface *out);
-void batten_surface_free(batten_surface *s);
+batten_status mesh_surface_build(batten_context *ctx, batten_rough_surface *rough, mesh_surface *out);
+void mesh_surface_free(mesh_surface *s);
 
 /* Half-edges that leave v, counter-clockwise; 0 when there are more than SURFACE_RING_MAX. */
-size_t batten_surface_ring(const batten_surface *s, uint32_t v, uint32_t *half_edges);
+size_t mesh_surface_ring(const mesh_surface *s, uint32_t v, uint32_t *half_edges);
 /* Neighbours of v: one for each half-edge of the ring, and one more at the boundary. */
-size_t batten_surface_neighbours(const batten_surface *s, uint32_t v, uint32_t *vertices);
+size_t mesh_surface_neighbours(const mesh_surface *s, uint32_t v, uint32_t *vertices);
 
-static inline bool batten_surface_on_boundary(const batten_surface *s, uint32_t v) {
+static inline bool mesh_surface_on_boundary(const mesh_surface *s, uint32_t v) {
   return s->twin[s->out[v]] == MESH_NONE;
 }
 
 /* Splits the edge of h at a new vertex x: its number, or MESH_NONE (out of memory). */
-uint32_t batten_surface_split(batten_surface *s, uint32_t h, const double *x);
+uint32_t mesh_surface_split(mesh_surface *s, uint32_t h, const double *x);
 
 /* Do the rings allow to draw the origin of h into its end (link condition)? */
-bool batten_surface_may_collapse(const batten_surface *s, uint32_t h);
+bool mesh_surface_may_collapse(const mesh_surface *s, uint32_t h);
 /* Does so; the end keeps its place. */
-void batten_surface_collapse(batten_surface *s, uint32_t h);
+void mesh_surface_collapse(mesh_surface *s, uint32_t h);
 
 /* Can the edge be turned in the quadrangle of its triangles? */
-bool batten_surface_may_flip(const batten_surface *s, uint32_t h);
-void batten_surface_flip(batten_surface *s, uint32_t h);
+bool mesh_surface_may_flip(const mesh_surface *s, uint32_t h);
+void mesh_surface_flip(mesh_surface *s, uint32_t h);
 
 /* Renumbers without the removed ones, in their order. Fails: NOMEM. */
-batten_status batten_surface_compact(batten_surface *s);
+batten_status mesh_surface_compact(mesh_surface *s);
 
 #endif

@@ -12,7 +12,7 @@
 #include "surface.h"
 
 #include "base/checked.h"
-#include "shape.h"
+#include "basis/shape.h"
 
 #include <string.h>
 
@@ -108,7 +108,7 @@ static void evaluate_side(const job *j, const strip *s, unsigned sample, bool ba
   combine(n + 1, bernstein_at(j, n, sample), s->s, out->point);
   combine(n, weights, s->t, t);
   combine(n, weights, s->x, x);
-  out->regular = net_shape_normal(t, x, out->normal, &area);
+  out->regular = surface_shape_normal(t, x, out->normal, &area);
   out->gauss = NAN;
   if (!out->regular) return;
   if (n >= 2) {

@@ -1,5 +1,5 @@
 /* Points, derivatives and curvatures at places on a network. */
-#include "shape.h"
+#include "basis/shape.h"
 #include "surface.h"
 
 #include "base/checked.h"
@@ -17,10 +17,10 @@ typedef struct job {
 
 static void evaluate(const batten_network *network, const batten_place *place, batten_surface_point *out) {
   double jet[6][3];
-  net_shape shape;
+  surface_shape shape;
   triangular_jet(net_surface_degree(network, place->patch),
                  (const double(*)[3])net_surface_points(network, place->patch), place->u, place->v, 2, jet);
-  net_shape_make((const double(*)[3])jet, &shape);
+  surface_shape_make((const double(*)[3])jet, &shape);
   memcpy(out->point, jet[0], sizeof jet[0]);
   memcpy(out->du, jet[1], sizeof jet[1]);
   memcpy(out->dv, jet[2], sizeof jet[2]);

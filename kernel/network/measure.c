@@ -12,7 +12,7 @@
 #include "box.h"
 #include "mesh/topology.h"
 #include "regular.h"
-#include "shape.h"
+#include "basis/shape.h"
 
 #include <string.h>
 
@@ -85,9 +85,9 @@ static double grad_form(const double (*s)[3], const double n[3]) {
 /* Adds a Gauss point; returns |du x dv|. */
 static double add_point(const double (*jet)[3], double weight, sums *s, sample *out) {
   double cross[3], area;
-  net_shape shape;
+  surface_shape shape;
   vec_cross(jet[1], jet[2], cross);
-  bool regular = net_shape_make(jet, &shape);
+  bool regular = surface_shape_make(jet, &shape);
   area = vec_norm(cross);
   double height = vec_dot(jet[0], cross);
   s->area += weight * area;
@@ -111,7 +111,7 @@ static void measure_grid(unsigned degree, const double (*net)[3], const double m
   for (unsigned k = 0; k < ROWS; k++)
     for (unsigned j = 0; j + k < ROWS; j++) {
       double jet[6][3], cross[3];
-      net_shape shape;
+      surface_shape shape;
       triangular_jet(degree, net, (double)j / (ROWS - 1), (double)k / (ROWS - 1), 2, jet);
       vec_cross(jet[1], jet[2], cross);
       least = fmin(least, vec_norm(cross));
@@ -119,7 +119,7 @@ static void measure_grid(unsigned degree, const double (*net)[3], const double m
         s->lower[d] = fmin(s->lower[d], jet[0][d] + middle[d]);
         s->upper[d] = fmax(s->upper[d], jet[0][d] + middle[d]);
       }
-      if (!net_shape_make((const double(*)[3])jet, &shape)) {
+      if (!surface_shape_make((const double(*)[3])jet, &shape)) {
         least = 0;
         continue;
       }

@@ -13,7 +13,7 @@
  *   fill_*.c     one facet each: raw arrays in, control points out; facet.c gathers what they need
  *   fair.c       the fair fill and its linear variant; fair_*.c
  *   surface.c    the handle; evaluate.c, tessellate.c, closest.c, measure.c, continuity.c, lines.c: know nothing of
- *                all above but the handle. For them: shape.c, normal and curvatures from derivatives; regular.c,
+ *                all above but the handle. For them: basis/shape.c, normal and curvatures; regular.c,
  *                proofs that a normal vanishes nowhere; patch_tree.c and box.c, boxes of patches and of the whole;
  *                pattern.c, triangles between edges of unlike density
  *

@@ -11,7 +11,7 @@
 #include "base/checked.h"
 #include "mesh/mesh_inner.h"
 #include "network/pattern.h"
-#include "network/shape.h"
+#include "basis/shape.h"
 #include "network/surface.h"
 
 #include <string.h>
@@ -152,11 +152,11 @@ static bool number(tessellation *t) {
 /* Adds the patch's shape at a place to a vertex; its point when asked for. */
 static void sample(const tessellation *t, size_t patch, double u, double v, gather *sum, double *point) {
   double jet[6][3];
-  net_shape shape;
+  surface_shape shape;
   triangular_jet(net_surface_degree(t->network, patch), (const double(*)[3])net_surface_points(t->network, patch), u,
                  v, 2, jet);
   if (point) memcpy(point, jet[0], sizeof jet[0]);
-  if (!net_shape_make((const double(*)[3])jet, &shape)) return;
+  if (!surface_shape_make((const double(*)[3])jet, &shape)) return;
   sum->gauss += shape.gauss;
   sum->mean += shape.mean;
   for (int x = 0; x < 3; x++) sum->normal[x] += shape.normal[x];

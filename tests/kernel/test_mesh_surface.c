@@ -7,7 +7,7 @@
 static batten_context *ctx;
 
 /* Every rule that surface.h states. */
-static bool holds_together(const batten_surface *s) {
+static bool holds_together(const mesh_surface *s) {
   for (uint32_t h = 0; h < 3 * s->triangle_count; h++) {
     if (s->origin[h] == MESH_NONE) continue;
     uint32_t g = s->twin[h], a = s->origin[h], b = s->origin[mesh_next(h)];
@@ -20,17 +20,17 @@ static bool holds_together(const batten_surface *s) {
     if (s->origin[h] != v) return false;
     /* From out[v] all half-edges that leave v are met. */
     uint32_t ring[SURFACE_RING_MAX];
-    size_t count = batten_surface_ring(s, v, ring), leaving = 0;
+    size_t count = mesh_surface_ring(s, v, ring), leaving = 0;
     for (uint32_t g = 0; g < 3 * s->triangle_count; g++) leaving += s->origin[g] == v;
     if (count && count != leaving) return false;
   }
   return true;
 }
 
-static batten_mesh_measures measure(batten_surface *s) {
+static batten_mesh_measures measure(mesh_surface *s) {
   batten_mesh *mesh = NULL;
   batten_mesh_measures m = {0};
-  batten_surface_compact(s);
+  mesh_surface_compact(s);
   batten_mesh_create(ctx, s->vertex_count, s->points, s->triangle_count, s->origin, &mesh);
   batten_mesh_measure(ctx, mesh, &m);
   batten_mesh_free(mesh);
@@ -38,7 +38,7 @@ static batten_mesh_measures measure(batten_surface *s) {
 }
 
 /* The cube, or without its first `missing` triangles; then all vertices count as lying on a box. */
-static batten_status build(size_t missing, batten_surface *s) {
+static batten_status build(size_t missing, mesh_surface *s) {
   batten_rough_surface rough = {.vertex_count = 8, .triangle_count = 12 - missing};
   rough.vertices = batten_alloc(ctx, sizeof cube_vertices);
   rough.faces = batten_alloc(ctx, 8);
@@ -46,11 +46,11 @@ static batten_status build(size_t missing, batten_surface *s) {
   memcpy(rough.vertices, cube_vertices, sizeof cube_vertices);
   memset(rough.faces, missing > 0, 8);
   memcpy(rough.triangles, cube_triangles + 3 * missing, (12 - missing) * 3 * sizeof *cube_triangles);
-  return batten_surface_build(ctx, &rough, s);
+  return mesh_surface_build(ctx, &rough, s);
 }
 
 static void test_random_changes(size_t missing, long euler, size_t loops) {
-  batten_surface s = {.ctx = ctx};
+  mesh_surface s = {.ctx = ctx};
   T_OK(build(missing, &s), ctx);
   uint64_t seed = 31 + missing;
   size_t done[3] = {0, 0, 0}, broken = 0;
@@ -60,13 +60,13 @@ static void test_random_changes(size_t missing, long euler, size_t loops) {
     size_t what = step / 300 % 2 ? 1 + t_random(&seed) % 2 : t_random(&seed) % 4 % 3;
     if (s.origin[h] == MESH_NONE) continue;
     double x[3] = {t_uniform(&seed), t_uniform(&seed), t_uniform(&seed)};
-    if (what == 0) done[0] += batten_surface_split(&s, h, x) != MESH_NONE;
-    if (what == 1 && batten_surface_may_collapse(&s, h)) {
-      batten_surface_collapse(&s, h);
+    if (what == 0) done[0] += mesh_surface_split(&s, h, x) != MESH_NONE;
+    if (what == 1 && mesh_surface_may_collapse(&s, h)) {
+      mesh_surface_collapse(&s, h);
       done[1]++;
     }
-    if (what == 2 && batten_surface_may_flip(&s, h)) {
-      batten_surface_flip(&s, h);
+    if (what == 2 && mesh_surface_may_flip(&s, h)) {
+      mesh_surface_flip(&s, h);
       done[2]++;
     }
     if (step % 10 == 0) broken += !holds_together(&s);
@@ -80,7 +80,7 @@ static void test_random_changes(size_t missing, long euler, size_t loops) {
   T_CHECK(broken == 0 && done[0] > 100 && done[1] > 100 && done[2] > 100,
           "%zu splits, %zu collapses, %zu flips: Euler number %ld and %zu boundary loops stay", done[0], done[1],
           done[2], euler, loops);
-  batten_surface_free(&s);
+  mesh_surface_free(&s);
 }
 
 /* A tetrahedron allows neither collapse nor flip. */
@@ -92,13 +92,13 @@ static void test_tetrahedron(void) {
   memcpy(rough.vertices, tetra_vertices, sizeof tetra_vertices);
   memset(rough.faces, 0, 4);
   memcpy(rough.triangles, tetra_triangles, sizeof tetra_triangles);
-  batten_surface s = {.ctx = ctx};
-  T_OK(batten_surface_build(ctx, &rough, &s), ctx);
+  mesh_surface s = {.ctx = ctx};
+  T_OK(mesh_surface_build(ctx, &rough, &s), ctx);
   bool allowed = false;
   for (uint32_t h = 0; h < 12; h++)
-    allowed = allowed || batten_surface_may_collapse(&s, h) || batten_surface_may_flip(&s, h);
+    allowed = allowed || mesh_surface_may_collapse(&s, h) || mesh_surface_may_flip(&s, h);
   T_CHECK(!allowed, "a tetrahedron stays one");
-  batten_surface_free(&s);
+  mesh_surface_free(&s);
 }
 
 static void test_open_inside(void) {
@@ -109,8 +109,8 @@ static void test_open_inside(void) {
   memcpy(rough.vertices, tetra_vertices, sizeof tetra_vertices);
   memset(rough.faces, 0, 4);
   memcpy(rough.triangles, tetra_triangles, sizeof tetra_triangles);
-  batten_surface s = {.ctx = ctx};
-  T_STATUS(batten_surface_build(ctx, &rough, &s), BATTEN_E_INTERNAL, ctx, "open at the edge");
+  mesh_surface s = {.ctx = ctx};
+  T_STATUS(mesh_surface_build(ctx, &rough, &s), BATTEN_E_INTERNAL, ctx, "open at the edge");
 }
 
 int main(void) {

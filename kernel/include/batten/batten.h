@@ -5,6 +5,7 @@
 #include <batten/base.h>
 #include <batten/blas.h>
 #include <batten/carrier.h>
+#include <batten/convex.h>
 #include <batten/field.h>
 #include <batten/lsq.h>
 #include <batten/matrix.h>
@@ -14,5 +15,6 @@
 #include <batten/saddle.h>
 #include <batten/solid.h>
 #include <batten/spline.h>
+#include <batten/surface.h>
 
 #endif

@@ -33,6 +33,13 @@ BATTEN_API const double *batten_mesh_field(const batten_mesh *mesh, size_t index
 /* normals [V][3]: unit, angle-weighted; 0 at vertices without area. */
 BATTEN_API batten_status batten_mesh_vertex_normals(batten_context *ctx, const batten_mesh *mesh, double *normals);
 
+/* Where a quantity that is linear on triangles passes its levels: values [V] at the vertices, levels [level_count];
+ * triangles with a corner that is not finite have no lines. *segments [*count][2][3], in the order of the levels and
+ * triangles, freed by batten_free(ctx, *segments); NULL when there are none. Fails: INVALID, NOMEM, TOO_LARGE. */
+BATTEN_API batten_status batten_mesh_level_lines(batten_context *ctx, const batten_mesh *mesh, const double *values,
+                                                 size_t level_count, const double *levels, size_t *count,
+                                                 double **segments);
+
 typedef struct batten_mesh_measures {
   size_t vertices, edges, triangles;     /* vertices: those in use */
   size_t components;                     /* triangles joined through edges */

@@ -12,6 +12,7 @@
 #define BATTEN_NETWORK_H
 
 #include <batten/mesh.h>
+#include <batten/surface.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -184,17 +185,6 @@ typedef struct batten_place {
   uint32_t patch;
   double u, v; /* u, v, 1 - u - v >= 0 on the patch; further out the polynomials go on */
 } batten_place;
-
-typedef struct batten_surface_point {
-  double point[3];
-  double du[3], dv[3];           /* first derivatives */
-  double duu[3], duv[3], dvv[3]; /* second */
-  double normal[3];              /* unit, outward; 0 where du x dv vanishes */
-  double gauss, mean;            /* curvatures, mean > 0 where the surface bends away from the normal (spheres); NaN
-                                    without a normal */
-  double principal[2];           /* the larger first */
-  double directions[2][3];       /* unit, in the tangent plane, for principal[0] and [1] */
-} batten_surface_point;
 
 /* places [count] -> out [count]. On the context's threads. Fails: INVALID (names the place). */
 BATTEN_API batten_status batten_network_evaluate(batten_context *ctx, const batten_network *network, size_t count,

@@ -43,6 +43,7 @@ extern "C" {
   X(BATTEN_W_AMBIGUOUS, 2, "done, but the sign of the solid is not settled by the data") \
   X(BATTEN_W_CLIPPED, 3, "done, but the surface is cut by its box")                      \
   X(BATTEN_W_STOPPED, 4, "stopped at a feasible point that is not the optimum")          \
+  X(BATTEN_W_SHAPE, 5, "done, but the data have another shape than was asked for")       \
   X(BATTEN_E_INVALID, -1, "invalid argument")                                            \
   X(BATTEN_E_NOMEM, -2, "out of memory")                                                 \
   X(BATTEN_E_TOO_LARGE, -3, "too large")                                                 \

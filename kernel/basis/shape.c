@@ -11,7 +11,7 @@
 
 #include "mesh/vec.h"
 
-bool net_shape_normal(const double du[3], const double dv[3], double normal[3], double *area) {
+bool surface_shape_normal(const double du[3], const double dv[3], double normal[3], double *area) {
   double larger = fmax(vec_dot(du, du), vec_dot(dv, dv));
   vec_cross(du, dv, normal);
   *area = vec_norm(normal);
@@ -39,9 +39,9 @@ static void larger_axis(double a, double b, double r, double *c, double *s) {
   }
 }
 
-bool net_shape_make(const double (*jet)[3], net_shape *out) {
+bool surface_shape_make(const double (*jet)[3], surface_shape *out) {
   double area;
-  if (!net_shape_normal(jet[1], jet[2], out->normal, &area)) {
+  if (!surface_shape_normal(jet[1], jet[2], out->normal, &area)) {
     out->gauss = out->mean = out->principal[0] = out->principal[1] = NAN;
     memset(out->directions, 0, sizeof out->directions);
     return false;

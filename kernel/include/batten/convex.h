@@ -1,0 +1,179 @@
+/* Convex surfaces from scattered data, by quadratic programming.
+ *   [Juettler: Convex surface fitting with parametric Bezier surfaces, 1998]
+ *   [Juettler: Surface fitting using convex tensor-product splines, 1997]
+ *
+ * A parametric tensor-product patch, or several that join smoothly (a B-spline surface), is fitted to points by least
+ * squares such that its Gaussian curvature is positive everywhere. A reference surface of the wanted shape yields
+ * linear inequalities for the control points that are sufficient; the fit is a quadratic program; its result, blended
+ * with the reference, is the next reference. Whether the result is convex is then proven by
+ * batten_surface_certify_convex, which knows nothing of the inequalities.
+ *
+ * Functions z = f(x, y) need no reference: there the inequalities fill the set of all convex splines as they become
+ * more. */
+#ifndef BATTEN_CONVEX_H
+#define BATTEN_CONVEX_H
+
+#include <batten/surface.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ---- parameters of scattered points ------------------------------------------------------------- */
+
+typedef enum batten_parametrization {
+  BATTEN_PARAMETERS_AUTO = 0, /* FLOATER where triangles are given, else PROJECT */
+  BATTEN_PARAMETERS_PROJECT,  /* into the best plane, in the least rectangle there */
+  BATTEN_PARAMETERS_FLOATER   /* shape-preserving [Floater 1997]: the boundary of a triangulation goes to the boundary
+                                 of the square by chord length, its corners to four of its vertices, and every inner
+                                 vertex is a convex combination of its neighbours. Without triangles: those of Delaunay
+                                 in the best plane. */
+} batten_parametrization;
+
+typedef struct batten_parametrize_options {
+  size_t struct_size;
+  batten_parametrization method; /* default AUTO */
+  size_t triangle_count;         /* of a triangulation of the points: a disc; every point in it */
+  const uint32_t *triangles;     /* [triangle_count][3] */
+  const uint32_t *corners; /* [4] boundary points in their order that go to (0,0), (1,0), (1,1), (0,1); NULL = those
+                              where the boundary turns most, FLOATER. Default NULL. */
+} batten_parametrize_options;
+BATTEN_API batten_parametrize_options batten_parametrize_options_default(void);
+
+/* points [count][3] -> parameters [count][2] in [0, 1]^2. The same for points that are moved, turned (PROJECT: up to
+ * which side is which) or scaled. u x v runs counter-clockwise about the plane's normal, whose largest coordinate is
+ * positive (FLOATER with triangles: about theirs). Cost: O(n log n); FLOATER solves a sparse system of n unknowns.
+ * Progress phase "parameters". Fails: INVALID (points on a line; triangles that are no disc), NOMEM, TOO_LARGE,
+ * CANCELLED. */
+BATTEN_API batten_status batten_parametrize(batten_context *ctx, size_t count, const double *points,
+                                            const batten_parametrize_options *opt, double *parameters);
+
+/* ---- parametric surfaces ------------------------------------------------------------------------ */
+
+typedef struct batten_convex_options {
+  size_t struct_size;
+  unsigned degree[2];     /* 2 .. 7. Default 3, 3. */
+  unsigned spans[2];      /* of equal length, 1 .. 16: 1, 1 is one Bezier patch. Default 1, 1. */
+  unsigned smoothness[2]; /* continuous derivatives at inner knots, 1 .. degree - 1; 0 = degree - 1. Default 0. */
+
+  const double *parameters; /* [count][2], NULL = by parametrize. Default NULL. */
+  double domain[2][2];      /* of the parameters: {{u_0, u_1}, {v_0, v_1}}, u_0 < u_1, and of the surface. Default
+                               {{0, 1}, {0, 1}}. All NaN: their bounding box. */
+  batten_parametrize_options parametrize;
+  const double *weights; /* [count] >= 0, NULL = ones */
+
+  unsigned rounds;   /* of inequalities, quadratic program and parameter correction, 1 .. 100. Default 10. */
+  double rounds_tol; /* stop when a round lowers the sum of squares by a smaller part. Default 1e-3. */
+  unsigned
+      correction_passes; /* of parameter correction (nearest places) in each round, 0 = parameters stay. Default 3. */
+  double tension;        /* weight of the integral of |x_uuu|^2 + |x_vvv|^2 + |x_uv|^2 beside the mean square
+                            distance [eq. 3; there beside the sum], domain [0, 1]^2, >= 0. What keeps places without
+                            data calm. Default 1e-6. */
+
+  /* The inequalities. */
+  double blend;        /* part of the old reference in the new one, (0, 1). Default 0.1. */
+  double margin;       /* every inequality holds by this part of what the reference has, (0, 1): K > 0. Default
+                          1e-3. */
+  unsigned directions; /* of the quadratic form, 3 .. 16. Default 4. */
+  double row_share;    /* a box is accepted where the reference has this part of the best value, (0, 1). Default
+                          0.15. */
+  unsigned depth_max;  /* bisections of span pairs, 0 .. 10. Default 6. */
+  size_t row_limit;    /* most inequalities, >= 1. Default 500000. */
+} batten_convex_options;
+BATTEN_API batten_convex_options batten_convex_options_default(void);
+
+enum { BATTEN_CONVEX_ROUNDS_MAX = 100 };
+
+typedef struct batten_convex_info {
+  size_t unknowns;                /* three a control point */
+  double lsq_unconstrained;       /* weighted sums of squares, caller's unit^2: without inequalities, same rounds of
+                                     parameter correction, least over them */
+  double lsq_unconstrained_first; /* the same at the first parameters */
+  double lsq_reference;           /* first reference surface, first parameters */
+  double lsq;                     /* of the result */
+  double rms, max_error;          /* of the result: distances of points from their places */
+  size_t max_error_index;         /* that point */
+  double tension_weight;  /* of the first reference: the paper's w, beside the sum, for points scaled to size 1 */
+  unsigned tension_steps; /* doublings and halvings */
+  unsigned rounds;        /* that were run */
+  unsigned round_best;    /* that gave the result, 0 = the reference already */
+  size_t rows_per_round[BATTEN_CONVEX_ROUNDS_MAX]; /* inequalities */
+  size_t boxes_per_round[BATTEN_CONVEX_ROUNDS_MAX];
+  double lsq_per_round[BATTEN_CONVEX_ROUNDS_MAX]; /* after parameter correction; never rises */
+  size_t rows_active;                             /* of the last quadratic program */
+  int plane;                   /* non-zero: no convex reference was found, the result is the best plane */
+  double misfit;               /* how much larger the mean square is than that of the unconstrained fit, in standard
+                                  deviations of what noise would do; see BATTEN_W_SHAPE */
+  double gauss_min, gauss_max; /* of the result */
+  double gauss_min_unconstrained, gauss_max_unconstrained;
+  batten_convexity convexity; /* of the result */
+  double time_parameters_s, time_reference_s, time_rows_s, time_qp_s, time_correction_s, time_check_s;
+} batten_convex_info;
+
+/* Fits a convex surface to points [count][3], any unit, count >= 6.
+ *   unconstrained  NULL, or a new surface: the fit without inequalities, for comparison
+ *   info           NULL, or the figures
+ * Progress phases: "parameters", "reference", "fit", "certify".
+ * BATTEN_OK            fitted, and proven strictly convex (info->convexity.certified)
+ * BATTEN_W_SHAPE       done, but the data have another shape: no convex surface near them was found, and the result
+ * is the best plane (info->plane); or the result is proven convex, but the data depart from it by far more than from
+ * the unconstrained fit: a dent. The text says where and by how much. BATTEN_W_ACCURACY    not proven; the text says
+ * where Same bits for any number of threads. Fails: INVALID (points on a line, all parameters equal, parameters
+ * outside the domain, named), NOMEM, TOO_LARGE, SINGULAR (parameters on a conic of parallel axes do not determine a
+ * surface), CANCELLED. */
+BATTEN_API batten_status batten_convex_fit(batten_context *ctx, size_t count, const double *points,
+                                           const batten_convex_options *opt, batten_surface **out,
+                                           batten_surface **unconstrained, batten_convex_info *info);
+
+/* ---- functions ---------------------------------------------------------------------------------- */
+
+typedef struct batten_convex_function_options {
+  size_t struct_size;
+  unsigned degree[2];       /* 2 .. 7. Default 3, 3. */
+  unsigned spans[2];        /* 1 .. 64. Default 4, 4. */
+  unsigned smoothness[2];   /* 1 .. degree - 1; 0 = degree - 1. Default 0. */
+  double domain[2][2];      /* {{x_0, x_1}, {y_0, y_1}}. All NaN (default): the points' bounding box. */
+  size_t break_count[2];    /* inner breaks of the spans, in place of equal spans; 0 = equal */
+  const double *breaks[2];  /* [break_count[i]] ascending, inside the domain */
+  const signed char *signs; /* [spans in x][in y] +1 convex, -1 concave, 0 free; NULL = all +1. Default NULL. */
+  const double *weights;    /* [count] >= 0, NULL = ones */
+  double tension;  /* weight of the integral of f_xx^2 + 2 f_xy^2 + f_yy^2 beside the mean square, domain scaled
+                      to [0, 1]^2, >= 0. Default 1e-8. */
+  double gap_tol;  /* refine the inequalities until the sum of squares is within this part of the proven lower
+                      bound, > 0. Default 1e-3. */
+  unsigned rounds; /* of refinement at most, 1 .. 20. Default 6. */
+} batten_convex_function_options;
+BATTEN_API batten_convex_function_options batten_convex_function_options_default(void);
+
+typedef struct batten_convex_function_info {
+  size_t unknowns;
+  double lsq_unconstrained;
+  double lsq;                        /* of the result */
+  double lsq_lower;                  /* no spline of this space with the signs has less: from necessary conditions */
+  double objective, objective_lower; /* the same with tension: what is minimised */
+  double rms, max_error;
+  size_t max_error_index;
+  unsigned rounds;
+  size_t rows_per_round[20]; /* sufficient inequalities */
+  size_t rows_outer;         /* necessary ones */
+  double slack;              /* of the certificate, see batten_convexity_options: 0 where all is strictly convex */
+  double gauss_min, gauss_max;
+  double gauss_min_unconstrained;
+  batten_convexity convexity;
+  double time_rows_s, time_qp_s, time_check_s;
+} batten_convex_function_info;
+
+/* Fits a spline function to points [count][3]: x, y, z = f(x, y), with f convex or concave on span pairs as
+ * opt->signs has it. The surface is its graph (x, y, f(x, y)), u = x, v = y. unconstrained as above.
+ * BATTEN_OK: proven, and within gap_tol of the best there is. W_STOPPED: proven, but the gap is larger (the text says
+ * it). W_ACCURACY: not proven. Progress phases "fit", "certify".
+ * Fails: INVALID, NOMEM, TOO_LARGE, CANCELLED. */
+BATTEN_API batten_status batten_convex_function_fit(batten_context *ctx, size_t count, const double *points,
+                                                    const batten_convex_function_options *opt, batten_surface **out,
+                                                    batten_surface **unconstrained,
+                                                    batten_convex_function_info *info);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,139 @@
+/* Tensor-product B-spline surfaces (Bezier patches are those of one span), and what can be asked of them; the proof
+ * of convexity among it.
+ *
+ *   x(u, v) = sum_i sum_j N_i(u) N_j(v) b_ij      (u, v) in [u_0, u_1] x [v_0, v_1]
+ *
+ * A place is (u, v) in the domain that the knots span. A span pair is a rectangle of the domain between neighbouring
+ * different knots of both directions: there the surface is one polynomial. */
+#ifndef BATTEN_SURFACE_H
+#define BATTEN_SURFACE_H
+
+#include <batten/mesh.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct batten_surface batten_surface; /* never changes */
+
+/* The point of a surface with its derivatives by the two parameters, normal and curvatures. */
+typedef struct batten_surface_point {
+  double point[3];
+  double du[3], dv[3];           /* first derivatives */
+  double duu[3], duv[3], dvv[3]; /* second */
+  double normal[3];              /* unit, outward: along du x dv; 0 where that vanishes */
+  double gauss, mean;            /* curvatures, mean > 0 where the surface bends away from the normal (spheres); NaN
+                                    without a normal */
+  double principal[2];           /* the larger first */
+  double directions[2][3];       /* unit, in the tangent plane, for principal[0] and [1] */
+} batten_surface_point;
+
+/* ---- the surface -------------------------------------------------------------------------------- */
+
+enum { BATTEN_SURFACE_DEGREE_MAX = 9 };
+
+/* What it is made of. With n_i = knot_count[i] - degree[i] - 1 control points in direction i. */
+typedef struct batten_surface_form {
+  unsigned degree[2]; /* in u and v, 1 .. BATTEN_SURFACE_DEGREE_MAX */
+  size_t knot_count[2];
+  const double *knots[2];       /* [knot_count[i]] not decreasing; the first and the last degree + 1 are equal, inner
+                                   ones at most degree[i] times (the surface is continuous) */
+  const double *control_points; /* [n_0][n_1][3]: v runs faster */
+} batten_surface_form;
+
+/* Copies. Fails: INVALID (names the knot or control point), NOMEM, TOO_LARGE. */
+BATTEN_API batten_status batten_surface_create(batten_context *ctx, const batten_surface_form *form,
+                                               batten_surface **out);
+BATTEN_API void batten_surface_free(batten_surface *surface);
+/* Its parts; the arrays are the surface's. */
+BATTEN_API batten_surface_form batten_surface_get(const batten_surface *surface);
+
+/* ---- evaluation --------------------------------------------------------------------------------- */
+
+/* places [count][2] in the domain -> out [count]. At inner knots where a derivative jumps: from the right. On the
+ * context's threads. Fails: INVALID (names the place). */
+BATTEN_API batten_status batten_surface_evaluate(batten_context *ctx, const batten_surface *surface, size_t count,
+                                                 const double *places, batten_surface_point *out);
+
+/* The nearest places to points [count][3]: places [count][2], distances [count] (may be NULL), caller's unit: the
+ * least distance to 1e-12 of the surface's size, by boxes over Bezier nets and Newton's method. BATTEN_W_ACCURACY:
+ * where the surface degenerates and that took too long; the text names the point that is worst off. Progress phase
+ * "closest". Fails: INVALID, NOMEM, CANCELLED. */
+BATTEN_API batten_status batten_surface_closest(batten_context *ctx, const batten_surface *surface, size_t count,
+                                                const double *points, double *places, double *distances);
+
+typedef struct batten_surface_tessellate_options {
+  size_t struct_size;
+  unsigned density; /* segments of every span in either direction, 1 .. 1024. Default 16. */
+  double tolerance; /* > 0: so many segments in each direction that triangles stay within this distance of the
+                       surface, caller's unit, but density at most. Default 0: density everywhere. */
+} batten_surface_tessellate_options;
+BATTEN_API batten_surface_tessellate_options batten_surface_tessellate_options_default(void);
+
+/* A mesh of the surface, a regular grid, counter-clockwise seen from the side of the normals. Fields: "gauss",
+ * "mean", "normal" (3), "place" (2). Fails: INVALID, NOMEM, TOO_LARGE. */
+BATTEN_API batten_status batten_surface_tessellate(batten_context *ctx, const batten_surface *surface,
+                                                   const batten_surface_tessellate_options *opt, batten_mesh **out);
+
+/* ---- measures ----------------------------------------------------------------------------------- */
+
+typedef struct batten_surface_measures {
+  double area;
+  double centroid[3];
+  double lower[3], upper[3];   /* box, by subdivided control nets: to 1e-9 of its size */
+  double gauss_min, gauss_max; /* over the whole surface: grid, then descent from its best places */
+  double gauss_min_at[2], gauss_max_at[2];
+  double gauss_p01, gauss_p50, gauss_p99; /* quantiles by area */
+  double gauss_integral;
+  double mean_min, mean_max;
+  double regularity_min; /* least |du x dv| over its mean */
+  double
+      supporting_gap; /* over a grid of tangent planes and points: how far a point lies beyond a tangent plane on the
+                         side to which the surface does not bend there, caller's unit: 0 of parts of convex bodies */
+} batten_surface_measures;
+/* By quadrature and sampling. Progress phase "measure". Fails: INVALID, NOMEM, CANCELLED. */
+BATTEN_API batten_status batten_surface_measure(batten_context *ctx, const batten_surface *surface,
+                                                batten_surface_measures *out);
+
+/* ---- the proof of convexity --------------------------------------------------------------------- */
+
+/* With L' = x_uu . (x_u x x_v), M' and N' likewise, K |x_u x x_v|^4 = L'N' - M'^2. On each span pair, subdivided as
+ * need be, the Bernstein coefficients of this polynomial and those of L' must have the right sign by more than all
+ * rounding errors together: then K > 0 everywhere, the surface has a normal everywhere, and bends to one side. Knows
+ * nothing of how the surface was made. */
+typedef struct batten_convexity_options {
+  size_t struct_size;
+  const signed char *signs; /* [span pairs in u][in v] what is to be shown: +1 normal curvatures have the sign of L' >
+                               0 (bends towards the normal; functions: convex), -1 that of L' < 0 (functions:
+                               concave), 0 nothing. NULL: one sign everywhere, whichever it is. Default NULL. */
+  double slack; /* >= 0: what is shown is that no normal curvature is below -slack (above +slack where -1), in the
+                   metric of the parameters: L' + slack, N' + slack take the place of L', N', in units of L'. For
+                   functions of which nothing strict can be said, like cylinders. Default 0. */
+  unsigned depth_max; /* bisections in each direction, 0 .. 30. Default 20. */
+  size_t box_limit;   /* boxes at most, >= 1. Default 1000000. */
+} batten_convexity_options;
+BATTEN_API batten_convexity_options batten_convexity_options_default(void);
+
+typedef struct batten_convexity {
+  int certified;       /* non-zero: proven on every span pair of which it was asked */
+  int flat;            /* non-zero: all of L', M', N' vanish to rounding: a plane, convex, but not strictly */
+  int sign;            /* of L' where one sign is asked for: +1, -1; 0 when it is not one */
+  double margin_min;   /* least over all boxes of the proven lower bound of K (of slack > 0: with it), 1 / unit^2, to
+                          within a tenth of what the surface has; below or equal 0 when not certified: the least value
+                          of K that was met */
+  double worst_at[2];  /* the middle of that box */
+  size_t boxes;        /* that were looked at */
+  unsigned depth;      /* bisections of the smallest */
+  size_t unproven;     /* boxes given up */
+  int graph;           /* non-zero: one direction is proven to have a positive product with all normals (or a negative
+                          one with all): the surface has no folds over the plane across it */
+  double direction[3]; /* that direction, unit; 0 when not graph */
+} batten_convexity;
+/* Returns BATTEN_OK whether certified or not. Progress phase "certify". Fails: INVALID, NOMEM, CANCELLED. */
+BATTEN_API batten_status batten_surface_certify_convex(batten_context *ctx, const batten_surface *surface,
+                                                       const batten_convexity_options *opt, batten_convexity *out);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
