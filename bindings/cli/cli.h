@@ -18,6 +18,7 @@ enum { CLI_DONE = 0, CLI_FAILED = 1, CLI_USAGE = 2, CLI_INTERRUPTED = 130 };
 int cli_solid(int argc, char **argv);
 int cli_qp(int argc, char **argv);
 int cli_network(int argc, char **argv);
+int cli_convex(int argc, char **argv);
 int cli_inspect(int argc, char **argv);
 
 /* ---- options.c: one table gives the parser and the help ---- */
@@ -96,6 +97,8 @@ typedef enum cli_output_kind {
   CLI_OUTPUT_REPORT,
   CLI_OUTPUT_SOLID,
   CLI_OUTPUT_NETWORK,
+  CLI_OUTPUT_PATCH,         /* tensor-product surface */
+  CLI_OUTPUT_UNCONSTRAINED, /* the same, to compare with */
   CLI_OUTPUT_QP,
   CLI_OUTPUT_QP_SOLUTION
 } cli_output_kind;
@@ -120,6 +123,9 @@ bool cli_outputs_check(cli_outputs *o, const char *input, bool *usage);
 bool cli_outputs_to_stdout(const cli_outputs *o);
 /* dimension 2 or 3: formats that fit. */
 bool cli_outputs_check_dimension(const cli_outputs *o, unsigned dimension);
+/* Name of a product in a CAD file: that of the file as given, not that under which it grows; without extension. malloc;
+ * NULL when out of memory. */
+char *cli_product_name(const char *path);
 /* Moves all into place; false after a line on stderr, with nothing new left. */
 bool cli_outputs_commit(cli_outputs *o);
 /* Removes what was staged and not committed. */
@@ -199,6 +205,9 @@ void cli_report_integer(cli_report *r, const char *key, long long value);
 void cli_report_bool(cli_report *r, const char *key, bool value);
 void cli_report_text(cli_report *r, const char *key, const char *value); /* NULL = null */
 void cli_report_null(cli_report *r, const char *key);
+/* Lists: one figure for each round, say. */
+void cli_report_numbers(cli_report *r, const char *key, size_t count, const double *values);
+void cli_report_counts(cli_report *r, const char *key, size_t count, const size_t *values);
 /* batten_version, blas, blas_threads, threads, status, status_text, time_total_s, peak_bytes. */
 void cli_report_common(cli_report *r, const cli_run *run, batten_status status);
 /* To each report among the outputs; false after a line on stderr. */

@@ -352,18 +352,13 @@ static batten_status measure(network_work *w) {
   return st;
 }
 
-/* The product of a CAD file has the name of the file as given, not that under which it grows. */
 static batten_status write_surface(network_work *w, const cli_output *f) {
   batten_write_network_options o = w->request->write;
-  const char *slash = strrchr(f->path, '/'), *base = slash ? slash + 1 : f->path, *dot = strrchr(base, '.');
-  size_t length = dot ? (size_t)(dot - base) : strlen(base);
-  char *name = batten_alloc(w->run.ctx, length + 1);
+  char *name = cli_product_name(f->path);
   if (!name) return BATTEN_E_NOMEM;
-  memcpy(name, base, length);
-  name[length] = '\0';
   o.name = name;
   batten_status st = batten_write_network(w->run.ctx, w->network, &o, f->staged ? f->staged : f->target);
-  batten_free(w->run.ctx, name);
+  free(name);
   return st;
 }
 

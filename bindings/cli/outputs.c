@@ -45,6 +45,11 @@ static char *copy_text(const char *text, size_t length) {
   return copy;
 }
 
+char *cli_product_name(const char *path) {
+  const char *slash = strrchr(path, '/'), *base = slash ? slash + 1 : path, *dot = strrchr(base, '.');
+  return copy_text(base, dot ? (size_t)(dot - base) : strlen(base));
+}
+
 bool cli_outputs_add(cli_outputs *o, cli_output_kind kind, const char *path) {
   if (o->count == o->room) {
     size_t room = o->room ? 2 * o->room : 8;
@@ -139,6 +144,9 @@ static const rule *rule_of(cli_output_kind kind) {
       {CLI_OUTPUT_PICTURE, plane_picture_formats, "--picture", ".png, for plane solids also .svg"},
       {CLI_OUTPUT_SHADED, picture_formats, "--picture", ".png"},
       {CLI_OUTPUT_NETWORK, network_formats, "-o", ".step .iges .json .vtu, or of a mesh .ply .obj .stl .off .vtp"},
+      {CLI_OUTPUT_PATCH, network_formats, "-o", ".step .iges .json .vtu, or of a mesh .ply .obj .stl .off .vtp"},
+      {CLI_OUTPUT_UNCONSTRAINED, network_formats, "--unconstrained",
+       ".step .iges .json .vtu, or of a mesh .ply .obj .stl .off .vtp"},
       {CLI_OUTPUT_QP, qp_formats, "--write", ".qps or .json"},
       {CLI_OUTPUT_QP_SOLUTION, qp_solution_formats, "-o", ".json or .csv"},
   };

@@ -23,6 +23,24 @@ void cli_report_integer(cli_report *r, const char *key, long long value) { set(r
 void cli_report_bool(cli_report *r, const char *key, bool value) { set(r, key, json_boolean(value)); }
 void cli_report_null(cli_report *r, const char *key) { set(r, key, json_null()); }
 
+/* A list of numbers, or of counts where those are given. */
+static void set_list(cli_report *r, const char *key, size_t count, const double *numbers, const size_t *counts) {
+  json_t *list = json_array();
+  for (size_t i = 0; list && i < count; i++) {
+    json_t *item = counts                 ? json_integer((json_int_t)counts[i])
+                   : isfinite(numbers[i]) ? json_real(numbers[i])
+                                          : json_null();
+    if (json_array_append_new(list, item) != 0) r->failed = true;
+  }
+  set(r, key, list);
+}
+void cli_report_numbers(cli_report *r, const char *key, size_t count, const double *values) {
+  set_list(r, key, count, values, NULL);
+}
+void cli_report_counts(cli_report *r, const char *key, size_t count, const size_t *values) {
+  set_list(r, key, count, NULL, values);
+}
+
 /* File names may hold bytes that are not UTF-8; JSON may not. */
 void cli_report_text(cli_report *r, const char *key, const char *value) {
   if (!value) {
@@ -51,6 +69,10 @@ static const char *status_word(batten_status status) {
       return "ambiguous";
     case BATTEN_W_CLIPPED:
       return "clipped";
+    case BATTEN_W_STOPPED:
+      return "stopped";
+    case BATTEN_W_SHAPE:
+      return "shape";
     default:
       return "failed";
   }

@@ -1,0 +1,12 @@
+/* Figures that a tensor-product surface itself has, for the commands that make or look at one. */
+#ifndef BATTEN_CLI_SURFACE_H
+#define BATTEN_CLI_SURFACE_H
+
+#include "cli.h"
+
+void surface_report_convexity(const batten_convexity *c, cli_report *r);
+void surface_report_measures(const batten_surface_measures *m, cli_report *r);
+void surface_print_convexity(const batten_convexity *c);
+void surface_print_measures(const batten_surface_measures *m);
+
+#endif

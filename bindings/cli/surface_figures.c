@@ -1,0 +1,60 @@
+/* Figures that a tensor-product surface itself has: the report's keys (docs/report.md), lines of the summary. */
+#include "surface.h"
+
+void surface_report_convexity(const batten_convexity *c, cli_report *r) {
+  cli_report_bool(r, "certified", c->certified != 0);
+  cli_report_bool(r, "flat", c->flat != 0);
+  cli_report_integer(r, "sign", c->sign);
+  cli_report_number(r, "margin_min", c->margin_min);
+  cli_report_number(r, "margin_u", c->worst_at[0]);
+  cli_report_number(r, "margin_v", c->worst_at[1]);
+  cli_report_count(r, "proof_boxes", c->boxes);
+  cli_report_count(r, "proof_depth", c->depth);
+  cli_report_count(r, "proof_unproven", c->unproven);
+  cli_report_bool(r, "graph", c->graph != 0);
+}
+
+void surface_report_measures(const batten_surface_measures *m, cli_report *r) {
+  cli_report_number(r, "K_min", m->gauss_min);
+  cli_report_number(r, "K_max", m->gauss_max);
+  cli_report_number(r, "K_min_u", m->gauss_min_at[0]);
+  cli_report_number(r, "K_min_v", m->gauss_min_at[1]);
+  cli_report_number(r, "K_max_u", m->gauss_max_at[0]);
+  cli_report_number(r, "K_max_v", m->gauss_max_at[1]);
+  cli_report_number(r, "K_p1", m->gauss_p01);
+  cli_report_number(r, "K_p50", m->gauss_p50);
+  cli_report_number(r, "K_p99", m->gauss_p99);
+  cli_report_number(r, "K_integral", m->gauss_integral);
+  cli_report_number(r, "H_min", m->mean_min);
+  cli_report_number(r, "H_max", m->mean_max);
+  cli_report_number(r, "regularity_min", m->regularity_min);
+  cli_report_number(r, "supporting_gap", m->supporting_gap);
+  cli_report_number(r, "area", m->area);
+  cli_report_number(r, "centroid_x", m->centroid[0]);
+  cli_report_number(r, "centroid_y", m->centroid[1]);
+  cli_report_number(r, "centroid_z", m->centroid[2]);
+  static const char *const box[] = {"box_x_min", "box_x_max", "box_y_min", "box_y_max", "box_z_min", "box_z_max"};
+  for (size_t k = 0; k < 3; k++) {
+    cli_report_number(r, box[2 * k], m->lower[k]);
+    cli_report_number(r, box[2 * k + 1], m->upper[k]);
+  }
+}
+
+void surface_print_convexity(const batten_convexity *c) {
+  if (c->certified)
+    cli_line("convexity", "proven: Gaussian curvature at least %.4g, in %zu boxes%s", c->margin_min, c->boxes,
+             c->graph ? "; no folds" : "");
+  else if (c->flat)
+    cli_line("convexity", "a plane");
+  else
+    cli_line("convexity", "not proven: Gaussian curvature %.4g near u = %.4g, v = %.4g", c->margin_min,
+             c->worst_at[0], c->worst_at[1]);
+}
+
+void surface_print_measures(const batten_surface_measures *m) {
+  cli_line("curvature", "Gaussian %.4g .. %.4g, 1 %% to 99 %% of the area %.4g .. %.4g", m->gauss_min, m->gauss_max,
+           m->gauss_p01, m->gauss_p99);
+  cli_line("area", "%.9g", m->area);
+  cli_line("box", "%.6g .. %.6g  x  %.6g .. %.6g  x  %.6g .. %.6g", m->lower[0], m->upper[0], m->lower[1],
+           m->upper[1], m->lower[2], m->upper[2]);
+}
