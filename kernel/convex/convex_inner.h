@@ -52,13 +52,62 @@ void convex_rows_free(batten_context *ctx, convex_rows *rows);
 
 /* ---- objective (objective.c) --------------------------------------------------------------------- */
 
-/* Of coordinates apart: `n` = convex_points. */
+/* Gram matrix of the k-th derivatives of a space's functions over its domain: out [count][count]. Exact. */
+void convex_gram(const bspline *b, unsigned k, double *out);
+
+/* The sum over points of weight |x(u, v) - point|^2, of coordinates apart: `n` = convex_points. */
 typedef struct convex_objective {
   size_t n, count;
+  unsigned order[2];    /* degree + 1: functions that live at a place */
+  const double *points; /* [count][3] the caller's, as are the weights: positive, or NULL = ones */
+  const double *weights;
   double *tension; /* [n][n] both triangles: b'T b is the integral of eq. 3 */
-  double *design;  /* [count][n] values of the basis at the parameters, times sqrt(weight) */
-  double *normal;  /* [n][n] design' design */
-  double *right;   /* [n][3] design' (sqrt(weight) points) */
+  double *basis;   /* [count][order[0] + order[1]] values of the functions in u, and in v */
+  uint32_t *first; /* [count][2] the first of them */
+  double *normal;  /* [n][n] both triangles: sum of weight N N' */
+  double *right;   /* [3][n] sum of weight N point */
 } convex_objective;
+
+/* Everything that does not depend on the parameters. Fails: NOMEM, TOO_LARGE. */
+batten_status convex_objective_new(batten_context *ctx, const convex_space *space, size_t count, const double *points,
+                                   const double *weights, convex_objective *out);
+void convex_objective_free(batten_context *ctx, convex_objective *o);
+/* The rest. parameters [count][2] in [0, 1]^2. */
+void convex_objective_set(convex_objective *o, const convex_space *space, const double *parameters);
+/* The sum of squares at the parameters that were set. control [n][3]. */
+double convex_objective_sum(const convex_objective *o, const convex_space *space, const double *control);
+/* Minimum of sum + w b'T b: control [n][3]. Fails: SINGULAR, NOMEM. */
+batten_status convex_objective_solve(batten_context *ctx, const convex_objective *o, const convex_space *space,
+                                     double w, double *control);
+/* Its limit for w -> infinity: the best biquadratic translational surface. SINGULAR: the parameters lie on one conic
+ * whose axes are parallel to theirs, and no w determines the surface. */
+batten_status convex_objective_limit(batten_context *ctx, const convex_objective *o, const convex_space *space,
+                                     const double *parameters, double *control);
+
+/* ---- places (correct.c) -------------------------------------------------------------------------- */
+
+/* The surface and its derivatives at a place of [0, 1]^2: jet [6][3]: x, x_u, x_v, x_uu, x_uv, x_vv. */
+void convex_jet(const convex_space *space, const double *control, const double place[2], double (*jet)[3]);
+
+/* Up to `passes` steps of each point to a nearer place; parameters [count][2] stay in [0, 1]^2. No distance rises.
+ * squares [count]: squared distances from the new places. On the context's threads. */
+void convex_correct(batten_context *ctx, const convex_space *space, const double *control, size_t count,
+                    const double *points, unsigned passes, double *parameters, double *squares);
+
+/* ---- reference (reference.c) --------------------------------------------------------------------- */
+
+typedef struct convex_reference {
+  double *control; /* [n][3] the caller's memory */
+  double weight;   /* w, beside the sum; INFINITY = the limit */
+  unsigned steps;  /* doublings and halvings */
+  bool found;      /* false: no w gives a convex surface, control is untouched */
+  bool whole;      /* already w_least does: it is the best fit, and needs no inequalities */
+} convex_reference;
+
+/* Binary search for the least w, not below w_least, whose surface the generator of inequalities takes for convex.
+ * Fails: SINGULAR, NOMEM, CANCELLED. */
+batten_status convex_reference_find(batten_context *ctx, const convex_objective *o, const convex_space *space,
+                                    const double *parameters, const convex_row_options *rows, double w_least,
+                                    convex_reference *out);
 
 #endif
