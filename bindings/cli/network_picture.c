@@ -136,6 +136,7 @@ static const double fineness_for_edges = 3;
 batten_status network_draw(const network_work *w, const char *path) {
   batten_context *ctx = w->run.ctx;
   drawing d = {0};
+  batten_picture_lines edges = {.color = 0x14161b};
   batten_picture_options o = w->request->picture;
   batten_tessellate_options t = batten_tessellate_options_default();
   double fineness = picture_fineness(w);
@@ -149,8 +150,10 @@ batten_status network_draw(const network_work *w, const char *path) {
   }
   if (st >= 0 && !w->request->no_edges && fineness >= fineness_for_edges) {
     st = find_edges(w, t.density, &d);
-    o.edge_count = d.edge_count;
-    o.edges = d.edges;
+    edges.count = d.edge_count;
+    edges.segments = d.edges;
+    o.line_count = 1;
+    o.lines = &edges;
   }
   if (st >= 0) st = batten_picture_mesh(ctx, d.mesh, &o, path);
   batten_free(ctx, d.edges);

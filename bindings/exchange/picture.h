@@ -17,9 +17,10 @@ typedef struct picture_color {
 
 typedef struct picture_image {
   size_t width, height;
-  float *rgb;                                    /* [height][width][3] linear light */
-  float *mask;                                   /* [height][width] coverage; zero between drawings */
-  size_t dirty_x0, dirty_y0, dirty_x1, dirty_y1; /* pixels of the mask that may be non-zero */
+  float *rgb;                                         /* [height][width][3] linear light */
+  float *mask;                                        /* [height][width] coverage; zero between drawings */
+  size_t dirty_x0, dirty_y0, dirty_x1, dirty_y1;      /* pixels of the mask that may be non-zero */
+  size_t whole_x, whole_y, whole_width, whole_height; /* where it lies in the whole picture, and the size of that */
 } picture_image;
 
 /* ---- image ---- */
@@ -30,6 +31,10 @@ void picture_mask_capsule(picture_image *image, double x0, double y0, double x1,
 void picture_mask_polygon(picture_image *image, size_t count, const double *xy);
 void picture_mask_fold(picture_image *image);
 void picture_mask_rectangle(picture_image *image, double x0, double y0, double x1, double y1);
+/* What is seen where nothing is; one for the whole picture. */
+picture_color picture_background(const picture_image *image, size_t x, size_t y);
+/* Copies an image to its place in the whole. */
+void picture_paste(const picture_image *image, picture_image *whole);
 /* Blends color * opacity through the mask and clears it. */
 void picture_blend(picture_image *image, picture_color color, double opacity);
 /* PNG, 8 bit sRGB. */
@@ -41,7 +46,7 @@ void picture_mask_text(picture_image *image, double x, double y, double height, 
 double picture_text_width(double height, const char *text);
 
 /* ---- colours and numbers ---- */
-picture_color picture_srgb(unsigned hex); /* 0xrrggbb as linear light */
+picture_color picture_srgb(unsigned hex);                         /* 0xrrggbb as linear light */
 picture_color picture_colormap(batten_picture_map map, double t); /* t in [0, 1]; NaN gives grey */
 /* Part of a white stripe, 0 .. 1, about a value of which a pixel covers `width`: stripes as in BATTEN_MAP_STRIPES. */
 double picture_stripe(double value, double width);
@@ -70,9 +75,16 @@ typedef struct picture_camera {
   double center[2];                /* pixel where the axis hits the image */
 } picture_camera;
 
-/* The mesh in the unit ball about its centre, z upwards, and its dots. */
+/* What becomes the unit ball about the origin, z upwards. */
+typedef struct picture_ball {
+  double center[3], radius;
+  unsigned axis[3]; /* which coordinate of the mesh becomes x, y, z */
+} picture_ball;
+void picture_to_ball(const picture_ball *ball, const double *point, float out[3]);
+
+/* The mesh in the unit ball, and its dots and lines. */
 typedef struct picture_scene {
-  size_t vertex_count, triangle_count, dot_count, line_count;
+  size_t vertex_count, triangle_count, dot_count, segment_count;
   const uint32_t *triangles;
   float *vertices; /* [V][3] */
   float *normals;  /* [V][3] */
@@ -80,10 +92,32 @@ typedef struct picture_scene {
   batten_picture_map map;
   float period;    /* of the values of stripes, 0 = none */
   float *dots;     /* [dot_count][3] */
-  float *lines;    /* [line_count][2][3] */
+  float *segments; /* [segment_count][2][3] of all kinds of lines, one after the other */
   float dot_radius;
-  float ground; /* height of the ground plane */
+  float ground;                       /* height of the ground plane */
+  bool shadows;                       /* on it; else it is not seen */
+  double progress_at, progress_share; /* of the whole picture, before it and its own */
 } picture_scene;
+/* Tells of progress with the scene, part in [0, 1]. */
+batten_status picture_progress(batten_context *ctx, const picture_scene *scene, double part);
+
+/* A mesh with its options in a rectangle of the picture. */
+typedef struct picture_view {
+  const batten_mesh *mesh;  /* NULL: nothing is drawn */
+  batten_picture_options o; /* checked; width and height are the rectangle's */
+  unsigned group;           /* views of one camera; 0 = by itself */
+  size_t x0, y0;            /* of the rectangle in the whole */
+  double unit;              /* height of lettering */
+  picture_ball ball;
+  picture_scene scene;
+  picture_camera camera;
+} picture_view;
+/* Checks a view's mesh; name goes before the text of an error, and may be empty. */
+batten_status picture_check_mesh(batten_context *ctx, const picture_view *view, const char *name);
+/* Balls, scenes and cameras of all views, and settles the ranges of their colours. Views may be empty or made partly:
+ * picture_views_free frees all. */
+batten_status picture_views_make(batten_context *ctx, size_t count, picture_view *views);
+void picture_views_free(batten_context *ctx, size_t count, picture_view *views);
 
 /* What is seen in each of width * height * samples^2 points of the image. */
 typedef struct picture_buffer {
@@ -102,9 +136,25 @@ void picture_depth_map(const picture_scene *scene, const float u[3], const float
                        float *turned, float *map);
 /* Screen position in samples, and nearness. */
 void picture_project(const picture_camera *camera, unsigned samples, const float point[3], float screen[3]);
-/* Lines [count][2][3] of the scene, dark, width in pixels, where nothing of it is in front of them. */
-void picture_draw_lines(picture_image *image, const picture_buffer *buffer, const picture_camera *camera, size_t count,
-                        const float *lines, double width);
+typedef struct picture_stroke {
+  picture_color color;
+  double width;            /* pixels */
+  double strength, hidden; /* opacity where nothing is in front of a line, and elsewhere */
+} picture_stroke;
+/* Lines [count][2][3] of the scene. */
+void picture_draw_lines(picture_image *image, const picture_buffer *buffer, const picture_camera *camera,
+                        size_t count, const float *lines, const picture_stroke *stroke);
 batten_status picture_shade(batten_context *ctx, const picture_scene *scene, const picture_camera *camera,
                             const picture_buffer *buffer, picture_image *image);
+
+/* ---- lettering beside and about it ---- */
+double picture_title_room(const batten_picture_options *o, double unit); /* at the top, pixels; 0 without a title */
+void picture_draw_title(picture_image *image, const batten_picture_options *o, double unit);
+bool picture_has_color_bar(const batten_picture_options *o);
+double picture_color_bar_room(const batten_picture_options *o, double unit); /* on the right */
+void picture_draw_color_bar(picture_image *image, const batten_picture_options *o, double unit);
+/* Axes: room on the left, right and below for their numbers; the walls of the box that are farther away with lines at
+ * the ticks, and numbers along three of its edges. */
+enum { PICTURE_AXES_LEFT = 7, PICTURE_AXES_RIGHT = 4, PICTURE_AXES_BELOW = 4, PICTURE_AXES_ABOVE = 2 }; /* units */
+void picture_draw_axes(picture_image *image, const picture_view *view, const picture_buffer *buffer);
 #endif

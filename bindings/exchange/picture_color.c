@@ -43,10 +43,17 @@ double picture_stripe(double value, double width) {
   return part + fade * (0.5 - part);
 }
 
+/* Two hues of like lightness, warm below the middle, cool above, that pale to almost white there. */
+static picture_color parted(double t) {
+  double part = fmin(1, fabs(2 * t - 1)), lightness = 0.95 - 0.33 * part;
+  return t < 0.5 ? oklab(lightness, 0.165 * part, 0.085 * part) : oklab(lightness, -0.045 * part, -0.115 * part);
+}
+
 picture_color picture_colormap(batten_picture_map map, double t) {
   if (isnan(t)) return (picture_color){0.4f, 0.4f, 0.4f};
   t = fmin(1, fmax(0, t));
   if (map == BATTEN_MAP_RAINBOW) return rainbow(t);
+  if (map == BATTEN_MAP_PARTED) return parted(t);
   if (map == BATTEN_MAP_STRIPES) {
     float level = (float)(0.012 + 0.84 * t);
     return (picture_color){level, level, level};

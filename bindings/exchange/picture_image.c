@@ -13,7 +13,12 @@
 #include <string.h>
 
 batten_status picture_image_new(batten_context *ctx, size_t width, size_t height, picture_image *out) {
-  picture_image image = {.width = width, .height = height, .dirty_x0 = width, .dirty_y0 = height};
+  picture_image image = {.width = width,
+                         .height = height,
+                         .dirty_x0 = width,
+                         .dirty_y0 = height,
+                         .whole_width = width,
+                         .whole_height = height};
   image.rgb = batten_alloc_array(ctx, width * height, 3 * sizeof *image.rgb);
   image.mask = batten_alloc_array(ctx, width * height, sizeof *image.mask);
   if (!image.rgb || !image.mask) {
@@ -30,6 +35,19 @@ void picture_image_free(batten_context *ctx, picture_image *image) {
   batten_free(ctx, image->rgb);
   batten_free(ctx, image->mask);
   image->rgb = image->mask = NULL;
+}
+
+picture_color picture_background(const picture_image *im, size_t x, size_t y) {
+  float u = ((float)(im->whole_x + x) + 0.5f) / (float)im->whole_width - 0.5f;
+  float v = ((float)(im->whole_y + y) + 0.5f) / (float)im->whole_height - 0.5f;
+  float level = 0.93f - 0.16f * v - 0.36f * (u * u + v * v);
+  return (picture_color){level * 0.985f, level * 0.995f, level};
+}
+
+void picture_paste(const picture_image *im, picture_image *whole) {
+  for (size_t y = 0; y < im->height; y++)
+    memcpy(whole->rgb + 3 * ((im->whole_y + y) * whole->width + im->whole_x), im->rgb + 3 * y * im->width,
+           3 * im->width * sizeof *im->rgb);
 }
 
 /* ---- mask ---------------------------------------------------------------------------------------- */

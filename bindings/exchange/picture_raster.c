@@ -145,10 +145,10 @@ batten_status picture_rasterize(batten_context *ctx, const picture_scene *scene,
                                 picture_buffer *buffer) {
   raster_job job = {scene, camera, buffer};
   batten_parallel(ctx, (scene->vertex_count + PROJECT_CHUNK - 1) / PROJECT_CHUNK, project_chunk, &job);
-  batten_status st = batten_progress(ctx, "picture", 0.05);
+  batten_status st = picture_progress(ctx, scene, 0.05);
   if (st < 0) return st;
   batten_parallel(ctx, (buffer->height + BAND_ROWS - 1) / BAND_ROWS, draw_band, &job);
-  return batten_progress(ctx, "picture", 0.2);
+  return picture_progress(ctx, scene, 0.2);
 }
 
 void picture_depth_map(const picture_scene *s, const float u[3], const float v[3], const float d[3], size_t size,

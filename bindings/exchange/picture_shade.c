@@ -356,15 +356,21 @@ static void light_chunk(void *arg, size_t chunk) {
 
 /* ---- picture ------------------------------------------------------------------------------------- */
 
-static picture_color background(const picture_image *im, size_t x, size_t y) {
-  float u = ((float)x + 0.5f) / (float)im->width - 0.5f, v = ((float)y + 0.5f) / (float)im->height - 0.5f;
-  float level = 0.93f - 0.16f * v - 0.36f * (u * u + v * v);
-  return (picture_color){level * 0.985f, level * 0.995f, level};
+/* 1 within a panel, 0 at its sides that are inside the picture: no shadow is cut off there. */
+static float away_from_sides(const picture_image *im, size_t x, size_t y) {
+  float fade = 0.12f * (float)(im->width < im->height ? im->width : im->height), least = fade;
+  if (im->whole_x > 0) least = fminf(least, (float)x + 0.5f);
+  if (im->whole_y > 0) least = fminf(least, (float)y + 0.5f);
+  if (im->whole_x + im->width < im->whole_width) least = fminf(least, (float)(im->width - x) - 0.5f);
+  if (im->whole_y + im->height < im->whole_height) least = fminf(least, (float)(im->height - y) - 0.5f);
+  float t = least / fade;
+  return t * t * (3 - 2 * t);
 }
 
 /* How much of its light the ground seen at a pixel has; open is what it gets without shadow. */
 static float ground_light(const shading *s, size_t px, size_t py, float open) {
   float eye[3], direction[3];
+  if (!s->scene->shadows) return 1;
   ray(s->camera, (double)px + 0.5, (double)py + 0.5, eye, direction);
   if (!(direction[2] < -1e-3f && eye[2] > s->scene->ground)) return 1;
   float w = (s->scene->ground - eye[2]) / direction[2];
@@ -378,7 +384,7 @@ static float ground_light(const shading *s, size_t px, size_t py, float open) {
   float near_row = p[0].light[1] + gx * (p[1].light[1] - p[0].light[1]);
   float far_row = p[s->ground].light[1] + gx * (p[s->ground + 1].light[1] - p[s->ground].light[1]);
   float part = (near_row + gy * (far_row - near_row)) / open;
-  return 1 - 0.85f * (1 - far) * (1 - fminf(1, part));
+  return 1 - 0.85f * (1 - far) * (1 - fminf(1, part)) * away_from_sides(s->image, px, py);
 }
 
 /* Bright parts bend and do not burn out. */
@@ -395,7 +401,7 @@ static void compose_row(void *arg, size_t y) {
   float open = 0;
   for (size_t k = 0; k < BEAMS; k++) open += fmaxf(0, s->beams[k].d[2]) * s->beams[k].color[1];
   for (size_t x = 0; x < im->width; x++) {
-    picture_color c = background(im, x, y);
+    picture_color c = picture_background(im, x, y);
     float *rgb = &im->rgb[3 * (y * im->width + x)], part = ground_light(s, x, y, open);
     rgb[0] = c.r * part, rgb[1] = c.g * part, rgb[2] = c.b * part;
   }
@@ -450,7 +456,7 @@ batten_status picture_shade(batten_context *ctx, const picture_scene *scene, con
   fill_ground(s, s->points + s->row_first[height]);
   batten_parallel(ctx, height, fill_row, s);
   for (size_t k = 0; k < BEAMS; k += BATCH) {
-    st = batten_progress(ctx, "picture", 0.25 + 0.65 * (double)k / BEAMS);
+    st = picture_progress(ctx, scene, 0.25 + 0.65 * (double)k / BEAMS);
     if (st < 0) goto done;
     s->beam_first = k;
     s->beam_end = k + BATCH < BEAMS ? k + BATCH : BEAMS;
@@ -459,7 +465,7 @@ batten_status picture_shade(batten_context *ctx, const picture_scene *scene, con
     batten_parallel(ctx, (s->total + CHUNK - 1) / CHUNK, light_chunk, s);
   }
   batten_parallel(ctx, height, compose_row, s);
-  st = batten_progress(ctx, "picture", 0.95);
+  st = picture_progress(ctx, scene, 0.95);
 done:
   batten_free(ctx, s->points);
   batten_free(ctx, s->turned);

@@ -227,7 +227,8 @@ static void test_surface(batten_context *ctx, const batten_mesh *ball) {
   o.width = 320, o.height = 240, o.normals = normals;
   T_OK(batten_picture_mesh(ctx, ball, &o, path_a), ctx);
   pixels plain = read_png(path_a);
-  o.edge_count = PIECES, o.edges = &lines[0][0];
+  const batten_picture_lines circle = {.count = PIECES, .segments = &lines[0][0]};
+  o.line_count = 1, o.lines = &circle;
   make_circle(0, lines, PIECES);
   T_OK(batten_picture_mesh(ctx, ball, &o, path_a), ctx);
   pixels equator = read_png(path_a);
@@ -240,7 +241,7 @@ static void test_surface(batten_context *ctx, const batten_mesh *ball) {
   T_CHECK(drawn < 10, "a line that is behind it does not: %zu pixels", drawn);
   for (size_t i = 0; i < V; i++)
     values[i] = 2 * v[3 * i + 2]; /* from 6 to 14; the last black one, at the top, is beyond the horizon */
-  o.edge_count = 0, o.colors = values, o.color_map = BATTEN_MAP_STRIPES, o.elevation_deg = 0;
+  o.line_count = 0, o.colors = values, o.color_map = BATTEN_MAP_STRIPES, o.elevation_deg = 0;
   T_OK(batten_picture_mesh(ctx, ball, &o, path_a), ctx);
   pixels zebra = read_png(path_a);
   int stripes = 0, level = 0;
@@ -271,8 +272,9 @@ static batten_status draw_small(batten_context *ctx, void *arg) {
   o.points = batten_mesh_vertices(ball);
   o.point_count = 3;
   o.colors = o.normals = batten_mesh_vertices(ball);
-  o.edges = batten_mesh_vertices(ball);
-  o.edge_count = 4;
+  const batten_picture_lines lines = {.count = 4, .segments = batten_mesh_vertices(ball)};
+  o.lines = &lines;
+  o.line_count = 1;
   batten_status st = batten_picture_mesh(ctx, ball, &o, path_b);
   batten_mesh_free(ball);
   return st;
@@ -301,12 +303,8 @@ static void test_bad(batten_context *ctx, const batten_mesh *ball) {
   T_STATUS(batten_picture_mesh(ctx, ball, &o, path_a), BATTEN_E_INVALID, ctx, "opt.points[1]: coordinate 1");
   o = good, o.color_lower = 1;
   T_STATUS(batten_picture_mesh(ctx, ball, &o, path_a), BATTEN_E_INVALID, ctx, "in order");
-  o = good, o.edge_count = 1;
-  T_STATUS(batten_picture_mesh(ctx, ball, &o, path_a), BATTEN_E_INVALID, ctx, "opt.edges: NULL");
-  o.edges = bad;
-  T_STATUS(batten_picture_mesh(ctx, ball, &o, path_a), BATTEN_E_INVALID, ctx, "opt.edges[0][1]: coordinate 1");
-  o = good, o.color_map = (batten_picture_map)3;
-  T_STATUS(batten_picture_mesh(ctx, ball, &o, path_a), BATTEN_E_INVALID, ctx, "opt.color_map: 3");
+  o = good, o.color_map = (batten_picture_map)4;
+  T_STATUS(batten_picture_mesh(ctx, ball, &o, path_a), BATTEN_E_INVALID, ctx, "opt.color_map: 4");
   T_STATUS(batten_picture_mesh(ctx, ball, NULL, "ball.jpg"), BATTEN_E_INVALID, ctx, "use .png");
   T_STATUS(batten_picture_mesh(ctx, ball, NULL, "/nonexistent/ball.png"), BATTEN_E_IO, ctx, "/nonexistent/ball.png");
   batten_mesh *empty = NULL;

@@ -190,9 +190,27 @@ typedef enum batten_picture_map { /* what colours a scalar has */
   BATTEN_MAP_LIGHTNESS = 0, /* dark blue over green to light yellow; keeps its order in grey and to the colour-blind */
   BATTEN_MAP_RAINBOW,       /* hues, red at the lower end over yellow, green, cyan to blue at the upper, as the figures of
                                Gaussian curvature have them in the paper on minimum norm networks */
-  BATTEN_MAP_STRIPES        /* zebra: white from whole numbers to the next half, black from there; for reflection lines.
+  BATTEN_MAP_STRIPES,       /* zebra: white from whole numbers to the next half, black from there: reflection lines.
                                color_upper - color_lower, if not 0, is the period at which the scalar begins anew */
+  BATTEN_MAP_PARTED         /* red below the middle of the range, paler towards it, blue above: for signs */
 } batten_picture_map;
+
+/* Lines of one kind. Each segment is short against the bends of the surface, if it lies on it. */
+typedef struct batten_picture_lines {
+  size_t count;
+  const double *segments; /* [count][2][3] their ends */
+  unsigned color;         /* 0xrrggbb */
+  double width;           /* thousandths of the picture's shorter side, 0 .. 100; 0 = 1.6 */
+  double hidden;          /* strength where something is in front of them, 0 .. 1; 0 = not drawn there */
+} batten_picture_lines;
+
+/* A box with scales about a mesh, as plots of functions have it. The box is in the mesh's coordinates, the numbers at
+ * its ends may be others: a plot has the proportions that its mesh has. */
+typedef struct batten_picture_axes {
+  double lower[3], upper[3]; /* box, lower < upper */
+  double from[3], to[3];     /* numbers at its ends, from < to */
+  const char *labels[3];     /* NULL = none; ASCII */
+} batten_picture_axes;
 
 typedef struct batten_picture_options {
   size_t struct_size;
@@ -209,14 +227,32 @@ typedef struct batten_picture_options {
   const char *title;       /* NULL = none; ASCII */
   const double *normals;   /* mesh: [V][3] to shade with, any length; NULL and rows of zeros: from the triangles. For
                               vertices that patches do not share */
-  size_t edge_count;       /* mesh: lines drawn on the surface where it is seen, 0 = none */
-  const double *edges;     /* [edge_count][2][3] their ends; each short against the surface's bends */
+  size_t line_count;       /* mesh: kinds of lines, 0 = none; later ones are drawn over earlier ones */
+  const batten_picture_lines *lines; /* [line_count] */
+  const batten_picture_axes *axes;   /* mesh: box with scales in place of a ground with shadows; NULL = none */
+  const char *caption;     /* mesh: a smaller line below the title; NULL = none; ASCII */
+  int no_color_bar;        /* mesh: non-zero: colours without their scale */
 } batten_picture_options;
 BATTEN_API batten_picture_options batten_picture_options_default(void);
 
 /* Shaded view of a mesh, or filled outline, made without a display: .png (both) or .svg (outline). */
 BATTEN_API batten_status batten_picture_mesh(batten_context *ctx, const batten_mesh *mesh,
                                              const batten_picture_options *opt, const char *path);
+/* Several meshes in one picture, in rows and columns of equal size.
+ *   panels  [rows][columns], rows and columns 1 .. 16
+ *   opt     of the whole: its width, height and title count; NULL = defaults
+ *   path    .png
+ * Fails: INVALID (names the panel), NOMEM, TOO_LARGE, CANCELLED, IO. */
+typedef struct batten_picture_panel {
+  const batten_mesh *mesh; /* NULL: nothing is drawn there */
+  const batten_picture_options *opt; /* its width and height do not count; NULL = defaults */
+  unsigned group; /* panels with the same number are seen by one camera, from where all of their meshes, axes and
+                     lines are in view: so they have one scale; azimuth_deg, elevation_deg and up_axis must be the
+                     same. 0 = by itself. */
+} batten_picture_panel;
+BATTEN_API batten_status batten_picture_panels(batten_context *ctx, unsigned rows, unsigned columns,
+                                               const batten_picture_panel *panels, const batten_picture_options *opt,
+                                               const char *path);
 BATTEN_API batten_status batten_picture_outline(batten_context *ctx, const batten_outline *outline,
                                                 const batten_picture_options *opt, const char *path);
 
