@@ -39,8 +39,28 @@ static batten_status check_axis(batten_context *ctx, const batten_surface_form *
   return BATTEN_OK;
 }
 
+/* The exponent that brings the size of the points' box to about 1; false when that size is beyond a double. */
+static bool find_exponent(size_t count, const double *points, int *out) {
+  double size = 0;
+  for (int d = 0; d < 3; d++) {
+    double lower = points[d], upper = points[d];
+    for (size_t i = 1; i < count; i++) {
+      lower = fmin(lower, points[3 * i + (size_t)d]);
+      upper = fmax(upper, points[3 * i + (size_t)d]);
+    }
+    size = fmax(size, upper - lower);
+  }
+  *out = size > 0 && isfinite(size) ? ilogb(batten_unit(size)) : 0;
+  return isfinite(size);
+}
+
 batten_status batten_surface_create(batten_context *ctx, const batten_surface_form *form, batten_surface **out) {
+  if (!ctx) return BATTEN_E_INVALID;
+  if (!form || !out)
+    return batten_fail(ctx, BATTEN_E_INVALID, "%s: NULL; give a form and room for its surface",
+                       form ? "out" : "form");
   size_t n[2], points, knots, bytes;
+  int exponent;
   for (int i = 0; i < 2; i++) {
     batten_status st = check_axis(ctx, form, i, &n[i]);
     if (st < 0) return st;
@@ -57,9 +77,13 @@ batten_status batten_surface_create(batten_context *ctx, const batten_surface_fo
   if (bad < points)
     return batten_fail(ctx, BATTEN_E_INVALID, "control_points[%zu][%zu][%zu]: %g; give finite points", bad / 3 / n[1],
                        bad / 3 % n[1], bad % 3, form->control_points[bad]);
+  if (!find_exponent(points / 3, form->control_points, &exponent))
+    return batten_fail(ctx, BATTEN_E_INVALID,
+                       "control_points: their box is larger than a double can say; scale them");
   batten_surface *s = batten_alloc(ctx, bytes);
   if (!s) return BATTEN_E_NOMEM;
   s->ctx = ctx;
+  s->exponent = exponent;
   double *block = (double *)(s + 1);
   for (int i = 0; i < 2; i++) {
     memcpy(block, form->knots[i], form->knot_count[i] * sizeof *block);

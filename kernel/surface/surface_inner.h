@@ -1,7 +1,8 @@
 /* What a surface is made of, for kernel/surface and kernel/convex.
  *
  * surface.c    create, free, parts         evaluate.c   points, normals, curvatures
- * closest.c    nearest places              tessellate.c meshes
+ * patches.c    span pairs as Bezier nets   tessellate.c meshes
+ * closest.c    nearest places
  * measure.c    area, extremes of K         certify*.c   the proof of convexity: includes nothing of kernel/convex and
  *                                          not the blossoms of basis/bspline.c, with which its inequalities are made
  */
@@ -16,9 +17,49 @@ struct batten_surface {
   batten_context *ctx;
   bspline space[2];       /* their knots are in the surface's one block */
   double *control_points; /* [space[0].count][space[1].count][3] */
+  int exponent;           /* 2^exponent brings the largest side of the control points' box to [1, 2) */
 };
+
+/* ---- evaluate.c ---------------------------------------------------------------------------------- */
 
 /* S, S_u, S_v, S_uu, S_uv, S_vv at a place of the domain: jet [6][3]. */
 void surface_jet(const batten_surface *surface, const double place[2], double (*jet)[3]);
+
+/* What one parameter has to say of a place: of it and a whole grid line of places the same. Derivatives are those by
+ * t' = 2^exponent t, in which the span is about 1 long, so that neither tiny nor huge domains overflow. */
+typedef struct surface_basis {
+  size_t first; /* control point of the first entry */
+  int exponent;
+  double value[BSPLINE_ORDER]; /* of control points first .. first + degree */
+  /* First and second derivatives as combinations of the differences b_(i + 1) - b_i of these control points. */
+  double slope[BSPLINE_DEGREE], bend[BSPLINE_DEGREE];
+} surface_basis;
+
+/* t on the closed span mu; at its ends derivatives are those from within. */
+void surface_basis_make(const bspline *space, size_t mu, double t, surface_basis *out);
+/* jet [6][3]: the point, and the derivatives by u' and v' of the surface times 2^surface->exponent: curvatures of
+ * this jet are those of the surface over that factor. */
+void surface_jet_scaled(const batten_surface *surface, const surface_basis *u, const surface_basis *v,
+                        double (*jet)[3]);
+void surface_point_make(const batten_surface *surface, const surface_basis *u, const surface_basis *v,
+                        batten_surface_point *out);
+
+/* ---- patches.c ----------------------------------------------------------------------------------- */
+
+/* The spans of one direction. */
+typedef struct surface_axis {
+  unsigned degree;
+  size_t count; /* of spans */
+  size_t *span; /* [count] mu */
+  double *rows; /* [count][degree + 1][degree + 1] Bezier points from control points */
+} surface_axis;
+
+/* Fails: NOMEM; free it in any case, zeroed before. */
+batten_status surface_axis_make(batten_context *ctx, const bspline *space, surface_axis *out);
+void surface_axis_free(batten_context *ctx, surface_axis *axis);
+
+/* The Bezier net [degree 0 + 1][degree 1 + 1][3] of span pair (i, j), 2^exponent (b - origin). */
+void surface_patch_net(const batten_surface *surface, const surface_axis axis[2], size_t i, size_t j,
+                       const double origin[3], int exponent, double (*net)[3]);
 
 #endif
