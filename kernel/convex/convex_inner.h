@@ -3,7 +3,8 @@
  * parameters.c, floater.c  parameters of scattered points (triangulation: mesh/delaunay.c)
  * objective.c              sums of squares and tension as matrices; their minimum
  * cones.c                  bounding cones of first derivatives and of their cross products on a box
- * inequalities.c           boxes, cones, rows: linear inequalities around a reference surface [section 4]
+ * boxes.c                  where the reference is convex enough for linear inequalities, by bisection [section 4]
+ * inequalities.c           those inequalities as rows
  * reference.c              the search for the tension weight [section 3]
  * correct.c                parameter correction
  * fit.c                    batten_convex_fit: checks, scales, rounds, judgement
