@@ -29,8 +29,6 @@ batten_network_patch bx_brep_side(const bx_brep *b, uint32_t half_edge, unsigned
   return batten_network_get_patch(b->network, count == 3 ? first + k : first);
 }
 
-double bx_brep_uncertainty(const bx_brep *b) { return pow(10, floor(log10(b->size)) - 7); }
-
 double bx_brep_rounding(const bx_brep *b) { return 64 * 0x1p-53 * fmax(b->size, b->reach); }
 
 unsigned bx_patch_curve(const bx_brep *b, const batten_network_patch *patch, unsigned side, double (*points)[3]) {

@@ -41,10 +41,6 @@ void bx_brep_free(batten_context *ctx, bx_brep *b);
 /* The patch that has side k of a face, and which of its sides that is. */
 batten_network_patch bx_brep_side(const bx_brep *b, uint32_t half_edge, unsigned *side);
 
-/* What CAD files tell as their accuracy: 1e-7 of the size, as a power of ten. Joints are better by far, but systems take
- * it for the tolerance at which they work. */
-double bx_brep_uncertainty(const bx_brep *b);
-
 /* What is left of raising and lowering a curve's degree by rounding. */
 double bx_brep_rounding(const bx_brep *b);
 

@@ -35,7 +35,7 @@ void bx_write_json_network(bx_writer *w, const batten_network *network) {
   bx_put_text(w, "],\n\"creases\": [");
   put_indices(w, batten_network_creases(network), batten_network_crease_count(network), 2);
   bx_put_text(w, "],\n\"patches\": [");
-  for (size_t p = 0; p < patches && bx_network_goes_on(w, p, patches); p++) {
+  for (size_t p = 0; p < patches && bx_goes_on(w, p, patches); p++) {
     batten_network_patch patch = batten_network_get_patch(network, p);
     bx_print(w, "%s\n{\"degree\": %u, \"face\": %lu, \"part\": %u, \"control_points\": [", p ? "," : "", patch.degree,
              (unsigned long)patch.face, patch.part);

@@ -28,12 +28,14 @@ uint64_t step_begin(step_text *s) {
   return s->last;
 }
 
-void step_put_references(step_text *s, const uint64_t *entities, size_t count) {
+void step_put_item(step_text *s, size_t i, uint64_t entity) {
   enum { IN_LINE = 10 };
-  for (size_t i = 0; i < count; i++) {
-    bx_put_text(s->w, i == 0 ? "(" : i % IN_LINE ? "," : ",\n");
-    step_put_reference(s, entities[i]);
-  }
+  bx_put_text(s->w, i == 0 ? "(" : i % IN_LINE ? "," : ",\n");
+  step_put_reference(s, entity);
+}
+
+void step_put_references(step_text *s, const uint64_t *entities, size_t count) {
+  for (size_t i = 0; i < count; i++) step_put_item(s, i, entities[i]);
   bx_put_u8(s->w, ')');
 }
 

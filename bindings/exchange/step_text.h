@@ -13,6 +13,8 @@ typedef struct step_text {
 uint64_t step_begin(step_text *s);
 /* "#17" */
 void step_put_reference(step_text *s, uint64_t entity);
+/* Item i of a list, with what stands before it: "(#1", ",#2"; broken into lines. The caller closes the list. */
+void step_put_item(step_text *s, size_t i, uint64_t entity);
 /* "(#1,#2,...)", broken into lines. */
 void step_put_references(step_text *s, const uint64_t *entities, size_t count);
 void step_put_real(step_text *s, double value); /* always with a point, which many readers need */

@@ -168,6 +168,12 @@ void bx_writer_fail(bx_writer *w, batten_status status) {
   if (w->status == BATTEN_OK) w->status = status;
 }
 
+bool bx_goes_on(bx_writer *w, size_t done, size_t all) {
+  if (w->status == BATTEN_OK && done % 1024 == 0)
+    bx_writer_fail(w, batten_progress(w->ctx, "write", (double)done / (double)all));
+  return w->status == BATTEN_OK;
+}
+
 batten_status bx_commit(bx_writer *w) {
   if (w->status == BATTEN_OK) flush(w);
   if (close(w->file) && errno != EINTR && w->status == BATTEN_OK) w->status = fail_errno(w, "write", errno);

@@ -46,6 +46,9 @@ void bx_put_f64(bx_writer *w, double value);
 /* For code that must stop because of something else (a library's error, cancel): bx_commit then returns status. */
 void bx_writer_fail(bx_writer *w, batten_status status);
 
+/* Asks for cancel now and then, under the progress phase "write"; false when the writer has stopped. */
+bool bx_goes_on(bx_writer *w, size_t done, size_t all);
+
 /* Puts the whole file in its place, or removes it. Releases everything. */
 batten_status bx_commit(bx_writer *w);
 

@@ -4,7 +4,6 @@
 #include "write.h"
 
 #include <math.h>
-#include <string.h>
 
 #include "base/checked.h"
 
@@ -12,38 +11,23 @@ batten_write_network_options batten_write_network_options_default(void) {
   return (batten_write_network_options){.struct_size = sizeof(batten_write_network_options), .density = 8};
 }
 
-bool bx_network_goes_on(bx_writer *w, size_t done, size_t all) {
-  if (w->status == BATTEN_OK && done % 1024 == 0)
-    bx_writer_fail(w, batten_progress(w->ctx, "write", (double)done / (double)all));
-  return w->status == BATTEN_OK;
-}
-
-/* "2026-11-22T10:00:00": digits and nothing else where they belong. */
-static bool is_time_stamp(const char *text) {
-  static const char shape[] = "dddd-dd-ddTdd:dd:dd";
-  if (strlen(text) != sizeof shape - 1) return false;
-  for (size_t i = 0; shape[i]; i++)
-    if (shape[i] == 'd' ? text[i] < '0' || text[i] > '9' : text[i] != shape[i]) return false;
-  return true;
+static bx_product product_of(const batten_write_network_options *o) {
+  return (bx_product){.unit = o->unit,
+                      .schema = o->schema,
+                      .name = o->name,
+                      .time_stamp = o->time_stamp,
+                      .description = "smooth surface through a triangle mesh"};
 }
 
 static batten_status check_options(batten_context *ctx, const batten_write_network_options *o) {
   batten_status st = batten_check_struct(ctx, "batten_write_network_options", o->struct_size, sizeof *o);
   if (st != BATTEN_OK) return st;
-  if ((unsigned)o->unit > BATTEN_UNIT_INCH)
-    return batten_fail(ctx, BATTEN_E_INVALID, "opt.unit: %d; must be one of BATTEN_UNIT_MM, CM, M, INCH",
-                       (int)o->unit);
   if ((unsigned)o->form > BATTEN_CAD_DEGENERATE)
     return batten_fail(ctx, BATTEN_E_INVALID, "opt.form: %d; must be one of BATTEN_CAD_TRIMMED, QUADS, DEGENERATE",
                        (int)o->form);
-  if ((unsigned)o->schema > BATTEN_STEP_AP242)
-    return batten_fail(ctx, BATTEN_E_INVALID, "opt.schema: %d; must be BATTEN_STEP_AP214 or BATTEN_STEP_AP242",
-                       (int)o->schema);
-  if (o->time_stamp && !is_time_stamp(o->time_stamp))
-    return batten_fail(ctx, BATTEN_E_INVALID, "opt.time_stamp: '%.40s'; must be as 2026-11-22T10:00:00",
-                       o->time_stamp);
-  if (o->name && strlen(o->name) > 255)
-    return batten_fail(ctx, BATTEN_E_INVALID, "opt.name: %zu bytes; at most 255", strlen(o->name));
+  bx_product product = product_of(o);
+  st = bx_check_product(ctx, &product);
+  if (st != BATTEN_OK) return st;
   if (o->density < 1 || o->density > 512)
     return batten_fail(ctx, BATTEN_E_INVALID, "opt.density: %u; must be 1 .. 512", o->density);
   if (!(o->tolerance >= 0) || isinf(o->tolerance))
@@ -51,47 +35,22 @@ static batten_status check_options(batten_context *ctx, const batten_write_netwo
   return BATTEN_OK;
 }
 
-/* "part" of "folder/part.step". */
-static void base_name(const char *path, char *out, size_t room) {
-  const char *slash = strrchr(path, '/');
-  if (slash) path = slash + 1;
-  const char *point = strrchr(path, '.');
-  size_t length = point && point > path ? (size_t)(point - path) : strlen(path);
-  if (length >= room) length = room - 1;
-  memcpy(out, path, length);
-  out[length] = '\0';
-}
-
-/* CAD systems take places that are nearer than 1e-7 mm for one; what has so small faces does not come back. */
-static batten_status check_size(batten_context *ctx, const bx_brep *brep, batten_length_unit unit) {
-  static const double millimetres[] = {1, 10, 1000, 25.4};
-  double size = brep->size * millimetres[unit], least = 1e-5;
-  if (size >= least && isfinite(size)) return BATTEN_OK;
-  return batten_fail(ctx, BATTEN_E_INVALID,
-                     "network: its size is %g mm; CAD files need %g mm at least: scale it or choose another unit",
-                     size, least);
-}
-
 static batten_status write_cad(batten_context *ctx, const batten_network *network,
                                const batten_write_network_options *o, bx_format format, const char *path) {
-  char name[256];
+  char name[BX_PRODUCT_NAME];
   bx_brep brep;
   bx_writer w;
-  bx_product product = {.unit = o->unit,
-                        .form = o->form,
-                        .schema = o->schema,
-                        .name = o->name ? o->name : name,
-                        .time_stamp = o->time_stamp ? o->time_stamp : "1970-01-01T00:00:00"};
-  base_name(path, name, sizeof name);
+  bx_product product = product_of(o);
+  bx_complete_product(&product, path, name);
   batten_status st = bx_brep_make(ctx, network, &brep);
   if (st != BATTEN_OK) return st;
-  st = check_size(ctx, &brep, o->unit);
+  st = bx_check_cad_size(ctx, "network", brep.size, o->unit);
   if (st == BATTEN_OK) st = bx_create(&w, ctx, path);
   if (st == BATTEN_OK) {
     if (format == BX_STEP)
-      bx_write_step(&w, &brep, &product);
+      bx_write_step_network(&w, &brep, o->form, &product);
     else
-      bx_write_iges(&w, &brep, &product);
+      bx_write_iges_network(&w, &brep, o->form, &product);
     st = bx_commit(&w);
   }
   bx_brep_free(ctx, &brep);
