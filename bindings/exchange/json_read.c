@@ -167,18 +167,23 @@ batten_status bx_get_numbers(bx_json *j, const json_t *object, const char *key, 
   return st;
 }
 
-static batten_status rows_of(bx_json *j, const json_t *value, size_t width, size_t *rows, double **out) {
+batten_status bx_fill_rows(bx_json *j, const json_t *value, size_t rows, size_t width, double *out) {
+  batten_status st = array(j, value, rows, "rows");
+  for (size_t i = 0; st == BATTEN_OK && i < rows; i++) {
+    size_t mark = bx_enter_item(j, i);
+    st = numbers(j, json_array_get(value, i), width, out + i * width);
+    bx_leave(j, mark);
+  }
+  return st;
+}
+
+batten_status bx_rows_of(bx_json *j, const json_t *value, size_t width, size_t *rows, double **out) {
   batten_status st = array(j, value, SIZE_MAX, "rows");
   if (st != BATTEN_OK) return st;
   size_t count = json_array_size(value);
   double *values = batten_alloc_array(j->ctx, count, (width ? width : 1) * sizeof *values);
   if (!values) return BATTEN_E_NOMEM;
-  if (width == 0) st = numbers(j, value, count, values);
-  for (size_t i = 0; st == BATTEN_OK && width && i < count; i++) {
-    size_t mark = bx_enter_item(j, i);
-    st = numbers(j, json_array_get(value, i), width, values + i * width);
-    bx_leave(j, mark);
-  }
+  st = width ? bx_fill_rows(j, value, count, width, values) : numbers(j, value, count, values);
   if (st == BATTEN_OK) {
     *rows = count;
     *out = values;
@@ -188,13 +193,22 @@ static batten_status rows_of(bx_json *j, const json_t *value, size_t width, size
   return st;
 }
 
+batten_status bx_get_array(bx_json *j, const json_t *object, const char *key, size_t count, json_t **out) {
+  batten_status st = bx_get(j, object, key, out);
+  if (st != BATTEN_OK) return st;
+  size_t mark = bx_enter(j, key);
+  st = array(j, *out, count, "items");
+  bx_leave(j, mark);
+  return st;
+}
+
 batten_status bx_get_rows(bx_json *j, const json_t *object, const char *key, size_t width, size_t *rows,
                           double **out) {
   json_t *value;
   batten_status st = bx_get(j, object, key, &value);
   if (st != BATTEN_OK) return st;
   size_t mark = bx_enter(j, key);
-  st = rows_of(j, value, width, rows, out);
+  st = bx_rows_of(j, value, width, rows, out);
   bx_leave(j, mark);
   return st;
 }

@@ -37,5 +37,11 @@ batten_status bx_get_numbers(bx_json *j, const json_t *object, const char *key, 
 /* [*rows][width] numbers in memory of the context; width 0: plain numbers, [*rows]. */
 batten_status bx_get_rows(bx_json *j, const json_t *object, const char *key, size_t width, size_t *rows,
                           double **out);
+/* An array of count items. */
+batten_status bx_get_array(bx_json *j, const json_t *object, const char *key, size_t count, json_t **out);
+
+/* The same as bx_get_rows, and [rows][width] numbers into out, of a value whose place is entered. */
+batten_status bx_rows_of(bx_json *j, const json_t *value, size_t width, size_t *rows, double **out);
+batten_status bx_fill_rows(bx_json *j, const json_t *value, size_t rows, size_t width, double *out);
 
 #endif

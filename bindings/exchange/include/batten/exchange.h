@@ -171,6 +171,39 @@ BATTEN_API batten_status batten_write_network(batten_context *ctx, const batten_
  * context's. Fails: IO, FORMAT, INVALID (unknown extension), NOMEM, TOO_LARGE, CANCELLED; *out untouched then. */
 BATTEN_API batten_status batten_read_network(batten_context *ctx, const char *path, batten_network **out);
 
+/* ---- surfaces of tensor products ----------------------------------------------------------------- */
+
+typedef struct batten_write_surface_options {
+  size_t struct_size;
+  batten_length_unit unit;   /* STEP, IGES: what the coordinates are in. Default MM. */
+  batten_step_schema schema; /* STEP. Default AP214. */
+  const char *name;          /* STEP, IGES: of the product, UTF-8; NULL = the file's name without its extension */
+  const char *time_stamp;    /* STEP, IGES: as in batten_write_network_options */
+  unsigned density;          /* meshes: segments of every span in either direction, 1 .. 1024. Default 16. */
+  double tolerance;          /* meshes: as in batten_surface_tessellate_options, caller's unit. Default 0. */
+} batten_write_surface_options;
+BATTEN_API batten_write_surface_options batten_write_surface_options_default(void);
+
+/* By extension:
+ *   .step .stp  ISO 10303-21: a shell of one face "face 1", a B-spline surface of the same degree, knots and control
+ *               points, bounded by its sides. Sides that are a point are no edges; sides that meet are one (a seam).
+ *               Places nearer than 1e-7 of the size are one.
+ *   .iges .igs  entity 128 as a face with its natural bounds (144)
+ *   .json       {"batten": "surface", "version": 1, ...}; reads back to the same bits
+ *   .vtu        Bezier quadrilaterals of VTK 9, one a span pair, exact; cell data "domain": u_0, u_1, v_0, v_1
+ *   .ply .obj .off .stl .vtp   tessellated, see batten_surface_tessellate
+ * Fails: IO, INVALID (unknown extension: lists the known; STEP and IGES: the control points span no area, or all four
+ * sides are points), TOO_LARGE, NOMEM, CANCELLED; what stood under the name is then as it was. */
+BATTEN_API batten_status batten_write_surface(batten_context *ctx, const batten_surface *surface,
+                                              const batten_write_surface_options *opt, const char *path);
+
+/* .json (also .gz) as batten_write_surface makes it. Checks everything and names the place: "a.json:
+ * surface.control_points[3][2]: ..." (FORMAT). While it is parsed, its tree is in memory that is not the context's.
+ * Fails: IO, FORMAT, INVALID (unknown extension), NOMEM, TOO_LARGE, CANCELLED; *out untouched then. */
+BATTEN_API batten_status batten_read_surface(batten_context *ctx, const char *path, batten_surface **out);
+
+/* ---- kinds of files ------------------------------------------------------------------------------ */
+
 /* What a file holds, by extension and content; only as much is read as that takes. Fails: IO, FORMAT. */
 typedef enum batten_file_kind {
   BATTEN_FILE_UNKNOWN = 0,
@@ -180,6 +213,7 @@ typedef enum batten_file_kind {
   BATTEN_FILE_CARRIER,
   BATTEN_FILE_QP,
   BATTEN_FILE_NETWORK,
+  BATTEN_FILE_SURFACE,
   BATTEN_FILE_DOCUMENT /* another batten JSON document */
 } batten_file_kind;
 BATTEN_API batten_status batten_file_identify(batten_context *ctx, const char *path, batten_file_kind *out);
