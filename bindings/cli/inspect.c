@@ -18,9 +18,9 @@ static void print_help(void) {
       "usage: batten inspect FILE [OPTIONS]\n\n"
       "Tells what is in a file: points, a mesh (its measures, whether it is closed and manifold, triangles that "
       "cross),\n"
-      "a network of Bezier triangles (continuity across its edges, curvature), a solid or a carrier saved by batten, "
-      "a\n"
-      "quadratic program (its sizes, which engine would solve it).\n\n");
+      "a network of Bezier triangles (continuity across its edges, curvature), a B-spline surface (whether it is "
+      "convex),\n"
+      "a solid or a carrier saved by batten, a quadratic program (its sizes, which engine would solve it).\n\n");
   cli_options_print(table);
   printf("\nexample:\n\n  batten inspect mesh.ply --report mesh.json\n");
 }
@@ -110,6 +110,41 @@ static batten_status tell_network(cli_run *run, const char *path, bool print, cl
   return st;
 }
 
+/* Different knots less one. */
+static size_t count_spans(const batten_surface_form *form, int direction) {
+  size_t count = 0;
+  for (size_t i = 1; i < form->knot_count[direction]; i++)
+    count += form->knots[direction][i] > form->knots[direction][i - 1];
+  return count;
+}
+
+static batten_status tell_surface(cli_run *run, const char *path, bool print, cli_report *r) {
+  batten_surface *surface = NULL;
+  batten_status st = batten_read_surface(run->ctx, path, &surface);
+  if (st < 0) return st;
+  batten_surface_form form = batten_surface_get(surface);
+  size_t points[2], spans[2];
+  for (int i = 0; i < 2; i++) {
+    points[i] = form.knot_count[i] - form.degree[i] - 1;
+    spans[i] = count_spans(&form, i);
+  }
+  cli_run_clear(run);
+  cli_report_count(r, "dimension", 3);
+  cli_report_count(r, "degree_u", form.degree[0]);
+  cli_report_count(r, "degree_v", form.degree[1]);
+  cli_report_count(r, "spans_u", spans[0]);
+  cli_report_count(r, "spans_v", spans[1]);
+  cli_report_count(r, "control_points", points[0] * points[1]);
+  if (print) {
+    cli_line("surface", "degree %u x %u, %zu x %zu control points, %zu x %zu spans", form.degree[0], form.degree[1],
+             points[0], points[1], spans[0], spans[1]);
+    cli_line("domain", "u %.6g .. %.6g, v %.6g .. %.6g", form.knots[0][0], form.knots[0][form.knot_count[0] - 1],
+             form.knots[1][0], form.knots[1][form.knot_count[1] - 1]);
+  }
+  batten_surface_free(surface);
+  return st;
+}
+
 static void tell_carrier_kind(cli_report *r, bool print, const batten_carrier *carrier) {
   batten_carrier_parts parts;
   batten_carrier_get_parts(carrier, &parts);
@@ -191,8 +226,8 @@ static bool no_option(cli_request *q, int key, const char *value) {
 }
 
 static int work(cli_request *q) {
-  static const char *const kinds[] = {"unknown",           "points",  "mesh",    "solid", "carrier",
-                                      "quadratic program", "network", "document"};
+  static const char *const kinds[] = {"unknown",           "points",  "mesh",    "solid",   "carrier",
+                                      "quadratic program", "network", "surface", "document"};
   cli_run run;
   if (!cli_run_open(&run, q->threads, 0, q->quiet)) return CLI_FAILED;
   run.input = q->input;
@@ -226,6 +261,9 @@ static int work(cli_request *q) {
         break;
       case BATTEN_FILE_NETWORK:
         st = tell_network(&run, q->input, print, &report);
+        break;
+      case BATTEN_FILE_SURFACE:
+        st = tell_surface(&run, q->input, print, &report);
         break;
       case BATTEN_FILE_DOCUMENT:
         break;

@@ -25,7 +25,8 @@ batten_status bx_check_product(batten_context *ctx, const bx_product *p) {
     return batten_fail(ctx, BATTEN_E_INVALID, "opt.time_stamp: '%.40s'; must be as 2026-11-22T10:00:00",
                        p->time_stamp);
   if (p->name && strlen(p->name) >= BX_PRODUCT_NAME)
-    return batten_fail(ctx, BATTEN_E_INVALID, "opt.name: %zu bytes; at most %d", strlen(p->name), BX_PRODUCT_NAME - 1);
+    return batten_fail(ctx, BATTEN_E_INVALID, "opt.name: %zu bytes; at most %d", strlen(p->name),
+                       BX_PRODUCT_NAME - 1);
   return BATTEN_OK;
 }
 

@@ -20,7 +20,8 @@ batten_status bx_check_product(batten_context *ctx, const bx_product *product);
  * time, so that the same surface gives the same bytes. */
 void bx_complete_product(bx_product *product, const char *path, char name[BX_PRODUCT_NAME]);
 
-/* CAD systems take places that are nearer than 1e-7 mm for one; what is not much larger does not come back: INVALID. */
+/* CAD systems take places that are nearer than 1e-7 mm for one; what is not much larger does not come back: INVALID.
+ */
 batten_status bx_check_cad_size(batten_context *ctx, const char *what, double size, batten_length_unit unit);
 /* What CAD files tell as their accuracy: 1e-7 of the size, as a power of ten. Joints are better by far, but systems
  * take it for the tolerance at which they work. */

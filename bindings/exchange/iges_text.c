@@ -77,7 +77,7 @@ static void put_ones(iges_file *f, size_t count) {
 /* Upper indices, degrees; closed, polynomial, not periodic. The first parameter runs faster. */
 void iges_put_surface(iges_file *f, const batten_surface_form *form, const bool closed[2]) {
   size_t rows = form->knot_count[0] - form->degree[0] - 1, columns = form->knot_count[1] - form->degree[1] - 1;
-  const size_t head[] = {rows - 1,  columns - 1, form->degree[0], form->degree[1], closed[0], closed[1], 1, 0, 0};
+  const size_t head[] = {rows - 1, columns - 1, form->degree[0], form->degree[1], closed[0], closed[1], 1, 0, 0};
   iges_begin(f, 128, IGES_PART, "", 0);
   for (size_t i = 0; i < sizeof head / sizeof head[0]; i++) iges_put_whole(f, (unsigned long)head[i]);
   for (int i = 0; i < 2; i++) iges_put_reals(f, form->knots[i], form->knot_count[i]);
@@ -192,11 +192,11 @@ void bx_write_iges(bx_writer *w, const bx_product *product, double size, double 
   unsigned global = put_global_section(w, product, size, reach);
   run_pass(&f, true, put, user);
   if (w->status == BATTEN_OK && (f.line > LINES_MAX || 2 * f.entity > LINES_MAX)) {
-    bx_writer_fail(w, batten_fail(w->ctx, BATTEN_E_TOO_LARGE, "%s: %zu lines of parameters; IGES numbers %d: write .step",
-                                  w->path, f.line, LINES_MAX));
+    bx_writer_fail(
+        w, batten_fail(w->ctx, BATTEN_E_TOO_LARGE, "%s: %zu lines of parameters; IGES numbers %d: write .step",
+                       w->path, f.line, LINES_MAX));
     return;
   }
   run_pass(&f, false, put, user);
-  bx_print(w, "S%7uG%7uD%7luP%7lu%40sT%7u\n", 1, global, (unsigned long)(2 * f.entity), (unsigned long)f.line, "",
-           1);
+  bx_print(w, "S%7uG%7uD%7luP%7lu%40sT%7u\n", 1, global, (unsigned long)(2 * f.entity), (unsigned long)f.line, "", 1);
 }

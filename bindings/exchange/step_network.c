@@ -97,8 +97,7 @@ static uint64_t put_face(step_file *s, const batten_network_patch *patch, unsign
   int at = snprintf(name, sizeof name, "face %lu", (unsigned long)patch->face);
   if (patch->part) at += snprintf(name + at, sizeof name - (size_t)at, " part %u", patch->part);
   if (quad) snprintf(name + at, sizeof name - (size_t)at, " quad %u", quad);
-  return step_put_face(&s->text, name, surface, loop,
-                       !s->brep->components[s->brep->component[patch->face]].inward);
+  return step_put_face(&s->text, name, surface, loop, !s->brep->components[s->brep->component[patch->face]].inward);
 }
 
 static void make_squares(step_file *s, const batten_network_patch *patch) {
@@ -136,9 +135,9 @@ static void put_quads(step_file *s, const batten_network_patch *patch, const sid
     const side *next = &sides[k], *last = &sides[(k + 2) % 3];
     uint64_t surface = put_surface(s, n, (const double(*)[3])s->squares[k]);
     step_loop b = {.count = 4,
-               .edges = {next->wire.edge[next->forward ? 0 : 1], spokes[k], spokes[(k + 2) % 3],
-                         last->wire.edge[last->forward ? 1 : 0]},
-               .forward = {next->forward, true, false, last->forward}};
+                   .edges = {next->wire.edge[next->forward ? 0 : 1], spokes[k], spokes[(k + 2) % 3],
+                             last->wire.edge[last->forward ? 1 : 0]},
+                   .forward = {next->forward, true, false, last->forward}};
     faces[k] = put_face(s, patch, k + 1, surface, &b);
   }
 }
@@ -163,8 +162,7 @@ static side mesh_side(const step_file *s, size_t face, unsigned k) {
 
 static void put_facet(step_file *s, size_t face) {
   size_t first;
-  unsigned count = batten_network_face_patches(s->brep->network, face, &first),
-           squares = bx_squares_of(s->form);
+  unsigned count = batten_network_face_patches(s->brep->network, face, &first), squares = bx_squares_of(s->form);
   batten_network_patch parts[3];
   wire inner[3];
   for (unsigned i = 0; i < count; i++) parts[i] = batten_network_get_patch(s->brep->network, first + i);
@@ -191,7 +189,8 @@ static void put_vertices_and_edges(step_file *s) {
   double points[BX_DEGREE_MAX + 1][3];
   memset(s->vertices, 0, batten_network_vertex_count(b->network) * sizeof *s->vertices);
   for (size_t i = 0; i < 3 * b->face_count; i++)
-    if (!s->vertices[triangles[i]]) s->vertices[triangles[i]] = step_put_vertex(&s->text, vertices + 3 * (size_t)triangles[i]);
+    if (!s->vertices[triangles[i]])
+      s->vertices[triangles[i]] = step_put_vertex(&s->text, vertices + 3 * (size_t)triangles[i]);
   for (size_t e = 0; e < b->edge_count && bx_goes_on(s->text.w, e, 4 * b->edge_count); e++) {
     uint32_t h = b->half[e], from = triangles[h], to = triangles[h - h % 3 + (h + 1) % 3];
     unsigned degree = bx_brep_curve(b, e, points);
@@ -201,8 +200,7 @@ static void put_vertices_and_edges(step_file *s) {
 
 static void put_facets(step_file *s) {
   size_t faces = s->brep->face_count;
-  for (size_t f = 0; f < faces && bx_goes_on(s->text.w, f + faces / 3, faces + faces / 3); f++)
-    put_facet(s, f);
+  for (size_t f = 0; f < faces && bx_goes_on(s->text.w, f + faces / 3, faces + faces / 3); f++) put_facet(s, f);
 }
 
 /* CLOSED_SHELL or OPEN_SHELL of a component. */
@@ -275,8 +273,8 @@ static uint64_t put_shape(step_file *s) {
     return step_put_representation(text, surfaces, s->product, placement, s->bodies, surface_count, context);
   uint64_t plain = step_put_representation(text, "SHAPE_REPRESENTATION", s->product, placement, NULL, 0, context);
   of[0] = step_put_representation(text, solids, s->product, placement, s->bodies, solid_count, context);
-  of[1] = step_put_representation(text, surfaces, s->product, placement, s->bodies + solid_count, surface_count,
-                                  context);
+  of[1] =
+      step_put_representation(text, surfaces, s->product, placement, s->bodies + solid_count, surface_count, context);
   for (int i = 0; i < 2; i++)
     step_print(&s->text, "SHAPE_REPRESENTATION_RELATIONSHIP('','',#%llu,#%llu)", (unsigned long long)plain,
                (unsigned long long)of[i]);

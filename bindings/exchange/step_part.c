@@ -84,7 +84,9 @@ uint64_t step_put_vertex_at(step_text *s, uint64_t point) {
   return step_print(s, "VERTEX_POINT('',#%llu)", (unsigned long long)point);
 }
 
-uint64_t step_put_vertex(step_text *s, const double point[3]) { return step_put_vertex_at(s, step_put_point(s, point)); }
+uint64_t step_put_vertex(step_text *s, const double point[3]) {
+  return step_put_vertex_at(s, step_put_point(s, point));
+}
 
 uint64_t step_put_edge(step_text *s, uint64_t from, uint64_t to, uint64_t curve) {
   return step_print(s, "EDGE_CURVE('',#%llu,#%llu,#%llu,.T.)", (unsigned long long)from, (unsigned long long)to,
@@ -95,8 +97,8 @@ uint64_t step_put_face(step_text *s, const char *name, uint64_t surface, const s
   uint64_t oriented[STEP_SIDES_MAX];
   const char *sense = logical(same_sense);
   for (unsigned i = 0; i < b->count; i++)
-    oriented[i] = step_print(s, "ORIENTED_EDGE('',*,*,#%llu,%s)", (unsigned long long)b->edges[i],
-                             logical(b->forward[i]));
+    oriented[i] =
+        step_print(s, "ORIENTED_EDGE('',*,*,#%llu,%s)", (unsigned long long)b->edges[i], logical(b->forward[i]));
   uint64_t loop = step_begin(s);
   bx_put_text(s->w, "EDGE_LOOP('',");
   step_put_references(s, oriented, b->count);
@@ -155,9 +157,9 @@ uint64_t step_put_representation(step_text *s, const char *keyword, const bx_pro
 
 void step_end_file(step_text *s, const bx_product *p, uint64_t shape) {
   bool ap242 = p->schema == BATTEN_STEP_AP242;
-  uint64_t application =
-      step_print(s, "APPLICATION_CONTEXT('%s')",
-                 ap242 ? "managed model based 3d engineering" : "core data for automotive mechanical design processes");
+  uint64_t application = step_print(
+      s, "APPLICATION_CONTEXT('%s')",
+      ap242 ? "managed model based 3d engineering" : "core data for automotive mechanical design processes");
   step_print(s, "APPLICATION_PROTOCOL_DEFINITION('international standard','%s',%d,#%llu)",
              ap242 ? "ap242_managed_model_based_3d_engineering" : "automotive_design", ap242 ? 2014 : 2000,
              (unsigned long long)application);
@@ -170,8 +172,8 @@ void step_end_file(step_text *s, const bx_product *p, uint64_t shape) {
   bx_print(s->w, ",'',(#%llu));\n", (unsigned long long)context);
   step_print(s, "PRODUCT_RELATED_PRODUCT_CATEGORY('part','',(#%llu))", (unsigned long long)product);
   uint64_t formation = step_print(s, "PRODUCT_DEFINITION_FORMATION('','',#%llu)", (unsigned long long)product);
-  uint64_t stage = step_print(s, "PRODUCT_DEFINITION_CONTEXT('part definition',#%llu,'design')",
-                              (unsigned long long)application);
+  uint64_t stage =
+      step_print(s, "PRODUCT_DEFINITION_CONTEXT('part definition',#%llu,'design')", (unsigned long long)application);
   uint64_t definition = step_print(s, "PRODUCT_DEFINITION('design','',#%llu,#%llu)", (unsigned long long)formation,
                                    (unsigned long long)stage);
   uint64_t of = step_print(s, "PRODUCT_DEFINITION_SHAPE('','',#%llu)", (unsigned long long)definition);

@@ -5,7 +5,6 @@
 #include "step_part.h"
 #include "surface.h"
 
-
 typedef struct step_surface {
   step_text text;
   const batten_surface_form *form;
@@ -67,16 +66,16 @@ static void put_file(step_surface *s, const bx_product *product) {
   s->first = surface - bx_form_points(s->form, 0) * bx_form_points(s->form, 1);
   step_loop loop = put_sides(s);
   uint64_t face = step_put_face(text, "face 1", surface, &loop, true);
-  uint64_t shell = step_print(text, "%s_SHELL('',(#%llu))", is_closed(&loop) ? "CLOSED" : "OPEN",
-                              (unsigned long long)face);
+  uint64_t shell =
+      step_print(text, "%s_SHELL('',(#%llu))", is_closed(&loop) ? "CLOSED" : "OPEN", (unsigned long long)face);
   uint64_t model = step_begin(text);
   bx_put_text(text->w, "SHELL_BASED_SURFACE_MODEL(");
   step_put_text(text, product->name);
   bx_print(text->w, ",(#%llu));\n", (unsigned long long)shell);
   uint64_t context = step_put_context(text, product, bx_cad_uncertainty(s->sides->size));
   uint64_t placement = step_put_placement(text);
-  uint64_t shape = step_put_representation(text, "MANIFOLD_SURFACE_SHAPE_REPRESENTATION", product, placement, &model, 1,
-                                           context);
+  uint64_t shape =
+      step_put_representation(text, "MANIFOLD_SURFACE_SHAPE_REPRESENTATION", product, placement, &model, 1, context);
   step_end_file(text, product, shape);
 }
 

@@ -13,10 +13,10 @@ enum { BX_SIDES = 4 };
 
 /* How the sides of a surface meet. */
 typedef struct bx_sides {
-  bool point[BX_SIDES];     /* the side is one point */
-  bool closed[2];           /* u, v: the sides at its lower and upper end are one curve */
+  bool point[BX_SIDES];      /* the side is one point */
+  bool closed[2];            /* u, v: the sides at its lower and upper end are one curve */
   unsigned corner[BX_SIDES]; /* at which sides begin: the number of the first corner in the same place */
-  double size, reach;       /* diagonal of the box of the control points, largest coordinate */
+  double size, reach;        /* diagonal of the box of the control points, largest coordinate */
 } bx_sides;
 
 /* Places nearer than the accuracy that CAD files tell are one. INVALID: the surface is a curve or a point. */

@@ -30,7 +30,8 @@ static void to_bezier(unsigned degree, const double *knots, size_t mu, double (*
     for (unsigned level = 1; level <= degree; level++) {
       double t = ends[level <= k ? 1 : 0];
       for (unsigned i = 0; i + level <= degree; i++) {
-        double lower = knots[mu - degree + level + i], upper = knots[mu + 1 + i], part = (t - lower) / (upper - lower);
+        double lower = knots[mu - degree + level + i], upper = knots[mu + 1 + i],
+               part = (t - lower) / (upper - lower);
         for (int x = 0; x < 3; x++) work[i][x] = (1 - part) * work[i][x] + part * work[i + 1][x];
       }
     }
