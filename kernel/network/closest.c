@@ -12,7 +12,7 @@
 #include "surface.h"
 
 #include "base/checked.h"
-#include "patch_tree.h"
+#include "mesh/box_tree.h"
 
 #include <float.h>
 #include <string.h>
@@ -48,7 +48,7 @@ typedef struct doubt {
 
 typedef struct job {
   const batten_network *network;
-  const net_patch_tree *tree;
+  const box_tree *tree;
   const weights *weights;
   double miss; /* caller's unit */
   size_t count, first_task, size;
@@ -342,7 +342,7 @@ typedef struct branch {
 } branch;
 
 static void search_tree(search *s) {
-  const net_patch_tree *tree = s->job->tree;
+  const box_tree *tree = s->job->tree;
   branch stack[TREE_STACK] = {{0, 0, tree->count, 0}};
   size_t height = 1;
   while (height > 0) {
@@ -354,8 +354,8 @@ static void search_tree(search *s) {
     }
     size_t mid = (b.from + b.to) / 2;
     branch left = {b.node + 1, b.from, mid, 0}, right = {b.node + 2 * (mid - b.from), mid, b.to, 0};
-    left.bound2 = net_box3_distance2(&tree->boxes[left.node], s->point);
-    right.bound2 = net_box3_distance2(&tree->boxes[right.node], s->point);
+    left.bound2 = box3_distance2(&tree->boxes[left.node], s->point);
+    right.bound2 = box3_distance2(&tree->boxes[right.node], s->point);
     bool first = left.bound2 <= right.bound2;
     stack[height++] = first ? right : left;
     stack[height++] = first ? left : right;
@@ -406,6 +406,17 @@ static double *make_weights(batten_context *ctx, weights *out) {
   return block;
 }
 
+static batten_status make_tree(batten_context *ctx, const batten_network *network, box_tree *out) {
+  box3 *leaves = batten_alloc_array(ctx, network->patch_count, sizeof *leaves);
+  if (!leaves) return BATTEN_E_NOMEM;
+  for (size_t p = 0; p < network->patch_count; p++)
+    leaves[p] = box3_of_points(triangular_count(net_surface_degree(network, p)),
+                               (const double(*)[3])net_surface_points(network, p));
+  batten_status st = box_tree_make(ctx, network->patch_count, leaves, out);
+  batten_free(ctx, leaves);
+  return st;
+}
+
 static batten_status search_all(batten_context *ctx, job *j) {
   size_t tasks = j->count / QUERIES + (j->count % QUERIES > 0);
   doubt doubts[BATCH], worst = {0};
@@ -450,7 +461,7 @@ batten_status batten_network_closest(batten_context *ctx, const batten_network *
   if (!ctx) return BATTEN_E_INVALID;
   batten_status st = check(ctx, network, count, points, places);
   if (st < 0 || count == 0) return st;
-  net_patch_tree tree = {0};
+  box_tree tree = {0};
   weights w = {{NULL}};
   job j = {.network = network,
            .tree = &tree,
@@ -466,7 +477,7 @@ batten_status batten_network_closest(batten_context *ctx, const batten_network *
   j.work = batten_alloc_array(ctx, BATCH, j.size * sizeof *j.work);
   j.parts = batten_alloc_array(ctx, BATCH, PARTS * sizeof *j.parts);
   if (!block || !j.places || !j.distances || !j.work || !j.parts) goto done;
-  st = net_patch_tree_make(ctx, network, &tree);
+  st = make_tree(ctx, network, &tree);
   if (st < 0) goto done;
   j.miss = MISS * vec_distance(tree.boxes[0].lower, tree.boxes[0].upper);
   st = search_all(ctx, &j);
@@ -474,7 +485,7 @@ batten_status batten_network_closest(batten_context *ctx, const batten_network *
   memcpy(places, j.places, count * sizeof *places);
   if (distances) memcpy(distances, j.distances, count * sizeof *distances);
 done:
-  net_patch_tree_free(ctx, &tree);
+  box_tree_free(ctx, &tree);
   batten_free(ctx, j.parts);
   batten_free(ctx, j.work);
   batten_free(ctx, j.distances);

@@ -9,35 +9,21 @@
 #include "surface.h"
 
 #include "base/checked.h"
+#include "basis/gauss8.h"
+#include "basis/quantile.h"
+#include "basis/shape.h"
 #include "box.h"
 #include "mesh/topology.h"
 #include "regular.h"
-#include "basis/shape.h"
 
 #include <string.h>
 
 enum {
-  NODES = 8,
-  POINTS = NODES * NODES,
+  POINTS = GAUSS8 * GAUSS8,
   ROWS = 15,
   SAMPLED = 16384, /* patches whose Gauss points all count for the quantiles; of more patches fewer points each */
   BATCH = 32       /* tasks between two progress calls */
 };
-static const double NODE[NODES / 2] = {0.18343464249564980494, 0.52553240991632898582, 0.79666647741362673959,
-                                       0.96028985649753623168};
-static const double WEIGHT[NODES / 2] = {0.36268378337836198297, 0.31370664587788728734, 0.22238103445337447054,
-                                         0.10122853629037625915};
-
-/* Node i of the rule on [0, 1]. */
-static void gauss_node(unsigned i, double *x, double *weight) {
-  unsigned k = i < NODES / 2 ? NODES / 2 - 1 - i : i - NODES / 2;
-  *x = 0.5 + (i < NODES / 2 ? -0.5 : 0.5) * NODE[k];
-  *weight = 0.5 * WEIGHT[k];
-}
-
-typedef struct sample {
-  double gauss, area; /* area 0: no sample */
-} sample;
 typedef struct sums {
   double area, volume, surface_moment[3], volume_moment[3], gauss, fairness;
   double gauss_min, gauss_max, mean_min, mean_max, regularity;
@@ -46,10 +32,10 @@ typedef struct sums {
 typedef struct job {
   const batten_network *network;
   double middle[3];
-  size_t first_task, each; /* patches of a task */
-  sums *sums;              /* [tasks] */
-  size_t stride, slots;    /* every stride-th Gauss point of a patch is a sample: [patches][slots] */
-  sample *samples;
+  size_t first_task, each;  /* patches of a task */
+  sums *sums;               /* [tasks] */
+  size_t stride, slots;     /* every stride-th Gauss point of a patch is a sample: [patches][slots] */
+  weighted_sample *samples; /* of K, by area */
 } job;
 
 /* ---- one place ---------------------------------------------------------------------------------- */
@@ -83,7 +69,7 @@ static double grad_form(const double (*s)[3], const double n[3]) {
 }
 
 /* Adds a Gauss point; returns |du x dv|. */
-static double add_point(const double (*jet)[3], double weight, sums *s, sample *out) {
+static double add_point(const double (*jet)[3], double weight, sums *s, weighted_sample *out) {
   double cross[3], area;
   surface_shape shape;
   vec_cross(jet[1], jet[2], cross);
@@ -100,7 +86,7 @@ static double add_point(const double (*jet)[3], double weight, sums *s, sample *
     s->gauss += weight * area * shape.gauss;
     s->fairness += weight * area * grad_form(jet, shape.normal);
   }
-  if (out) *out = (sample){shape.gauss, regular ? weight * area : 0};
+  if (out) *out = (weighted_sample){shape.gauss, regular ? weight * area : 0};
   return area;
 }
 
@@ -136,12 +122,12 @@ static void measure_patch(const job *j, size_t patch, sums *s) {
   const double(*from)[3] = (const double(*)[3])net_surface_points(j->network, patch);
   double net[TRIANGULAR_MAX][3], mean_area = 0;
   for (size_t i = 0; i < triangular_count(degree); i++) vec_sub(from[i], j->middle, net[i]);
-  sample *samples = j->samples + patch * j->slots;
-  for (size_t i = 0; i < j->slots; i++) samples[i].area = 0;
+  weighted_sample *samples = j->samples + patch * j->slots;
+  for (size_t i = 0; i < j->slots; i++) samples[i].weight = 0;
   for (unsigned i = 0; i < POINTS; i++) {
     double x, y, wx, wy, jet[TRIANGULAR_JET][3];
-    gauss_node(i / NODES, &x, &wx);
-    gauss_node(i % NODES, &y, &wy);
+    gauss8_node(i / GAUSS8, &x, &wx);
+    gauss8_node(i % GAUSS8, &y, &wy);
     double weight = wx * wy * (1 - x);
     triangular_jet(degree, (const double(*)[3])net, x, y * (1 - x), 3, jet);
     /* Other points on other patches, so that all parts of patches are seen alike. */
@@ -189,44 +175,6 @@ static void add_sums(const sums *from, sums *to) {
     to->lower[d] = fmin(to->lower[d], from->lower[d]);
     to->upper[d] = fmax(to->upper[d], from->upper[d]);
   }
-}
-
-/* ---- quantiles ---------------------------------------------------------------------------------- */
-
-/* Unsigned numbers in the order of the doubles. */
-static uint64_t order_key(double x) {
-  uint64_t bits;
-  memcpy(&bits, &x, sizeof bits);
-  return bits >> 63 ? ~bits : bits | (uint64_t)1 << 63;
-}
-static double from_key(uint64_t key) {
-  uint64_t bits = key >> 63 ? key & ~((uint64_t)1 << 63) : ~key;
-  double x;
-  memcpy(&x, &bits, sizeof x);
-  return x;
-}
-
-static double area_up_to(size_t count, const sample *samples, double gauss) {
-  double area = 0;
-  for (size_t i = 0; i < count; i++)
-    if (samples[i].area > 0 && samples[i].gauss <= gauss) area += samples[i].area;
-  return area;
-}
-
-/* The least value among the samples up to which lies a part q of the area: by bisection over all doubles, which
- * needs no order and no room. */
-static double quantile(size_t count, const sample *samples, double q) {
-  double whole = area_up_to(count, samples, INFINITY);
-  if (!(whole > 0)) return NAN;
-  uint64_t low = order_key(-INFINITY), high = order_key(INFINITY);
-  while (high - low > 1) {
-    uint64_t mid = low + (high - low) / 2;
-    if (area_up_to(count, samples, from_key(mid)) >= q * whole)
-      high = mid;
-    else
-      low = mid;
-  }
-  return from_key(high);
 }
 
 /* ---- the whole ---------------------------------------------------------------------------------- */
@@ -288,7 +236,7 @@ static batten_status set_quantiles(batten_context *ctx, const job *j, batten_net
   for (int i = 0; i < 5; i++) {
     batten_status st = batten_progress(ctx, "measure", 0.8 + 0.01 * i);
     if (st < 0) return st;
-    *value[i] = quantile(j->network->patch_count * j->slots, j->samples, part[i]);
+    *value[i] = weighted_quantile(j->network->patch_count * j->slots, j->samples, part[i]);
   }
   return BATTEN_OK;
 }

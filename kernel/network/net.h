@@ -14,7 +14,7 @@
  *   fair.c       the fair fill and its linear variant; fair_*.c
  *   surface.c    the handle; evaluate.c, tessellate.c, closest.c, measure.c, continuity.c, lines.c: know nothing of
  *                all above but the handle. For them: basis/shape.c, normal and curvatures; regular.c,
- *                proofs that a normal vanishes nowhere; patch_tree.c and box.c, boxes of patches and of the whole;
+ *                proofs that a normal vanishes nowhere; box.c, the box of the whole;
  *                pattern.c, triangles between edges of unlike density
  *
  * Below network.c coordinates are scaled by a power of two, and shifted, so that the mesh's size is about 1:

@@ -1,7 +1,6 @@
 /* Nearest places: against distances known in closed form, against a search over fine samples, and where it is hard.
  */
 #include "mesh/vec.h"
-#include "network/patch_tree.h"
 #include "network/surface.h"
 #include "network_shapes.h"
 #include "tap.h"
@@ -328,37 +327,6 @@ static void test_units(batten_context *ctx, batten_context *three) {
   shape_free(&turned);
 }
 
-/* Each node holds what is below it; all patches are there. */
-static void test_tree(batten_context *ctx) {
-  shape s = shape_torus(3);
-  batten_network *n = network_of(ctx, &s);
-  net_patch_tree tree;
-  T_OK(net_patch_tree_make(ctx, n, &tree), ctx);
-  size_t stack[200][3] = {{0, 0, tree.count}}, height = 1, nodes = 0;
-  bool holds = true;
-  unsigned char *seen = calloc(tree.count, 1);
-  while (height > 0) {
-    size_t *t = stack[--height], node = t[0], from = t[1], to = t[2], mid = (from + to) / 2;
-    nodes++;
-    for (size_t i = from; i < to; i++) {
-      double(*net)[3] = net_surface_points(n, tree.order[i]);
-      for (size_t k = 0; k < 28; k++) holds = holds && net_box3_distance2(&tree.boxes[node], net[k]) == 0;
-    }
-    if (to - from == 1) {
-      seen[tree.order[from]]++;
-      continue;
-    }
-    memcpy(stack[height++], (size_t[3]){node + 1, from, mid}, sizeof stack[0]);
-    memcpy(stack[height++], (size_t[3]){node + 2 * (mid - from), mid, to}, sizeof stack[0]);
-  }
-  for (size_t p = 0; p < tree.count; p++) holds = holds && seen[p] == 1;
-  T_CHECK(holds && nodes == 2 * tree.count - 1, "the tree holds each patch once, boxes hold what is below");
-  free(seen);
-  net_patch_tree_free(ctx, &tree);
-  batten_network_free(n);
-  shape_free(&s);
-}
-
 static batten_status find_some(batten_context *ctx, void *arg) {
   batten_network *n = NULL;
   double points[300][3], distances[300];
@@ -400,7 +368,6 @@ static void test_bad(batten_context *ctx) {
 
 int main(void) {
   batten_context *ctx = t_context(NULL, NULL, 1), *three = t_context(NULL, NULL, 3);
-  test_tree(ctx);
   test_octahedron(ctx);
   shape s = shape_graph(3, 3, 2, wave);
   against_brute_force(ctx, &s, "a wave", 1.5, 40);

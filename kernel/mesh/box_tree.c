@@ -1,27 +1,13 @@
-/* A balanced tree of boxes around the control points of a network's patches: halves by the middles of the boxes along
- * the longest axis, until one patch is left. See patch_tree.h. */
-#include "patch_tree.h"
+/* A balanced tree of boxes: halves by the middles of the boxes along the longest axis, until one is left. */
+#include "box_tree.h"
 
 #include <math.h>
+#include <stdbool.h>
 
-#include "surface.h"
+enum { STACK = 64 }; /* the depth is the number of bits of the boxes' number */
 
-enum { STACK = 64 }; /* the depth is the number of bits of the patches' number */
-
-static net_box3 box_of_patch(const batten_network *network, size_t patch) {
-  const double(*net)[3] = (const double(*)[3])net_surface_points(network, patch);
-  size_t count = triangular_count(net_surface_degree(network, patch));
-  net_box3 b = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
-  for (size_t i = 0; i < count; i++)
-    for (int d = 0; d < 3; d++) {
-      b.lower[d] = fmin(b.lower[d], net[i][d]);
-      b.upper[d] = fmax(b.upper[d], net[i][d]);
-    }
-  return b;
-}
-
-static net_box3 joined(const net_box3 *a, const net_box3 *b) {
-  net_box3 c;
+static box3 joined(const box3 *a, const box3 *b) {
+  box3 c;
   for (int d = 0; d < 3; d++) {
     c.lower[d] = fmin(a->lower[d], b->lower[d]);
     c.upper[d] = fmax(a->upper[d], b->upper[d]);
@@ -30,13 +16,13 @@ static net_box3 joined(const net_box3 *a, const net_box3 *b) {
 }
 
 /* Twice the middle; equal ones by their number, so that the outcome is one alone. */
-static bool before(const net_box3 *leaves, int axis, uint32_t a, uint32_t b) {
+static bool before(const box3 *leaves, int axis, uint32_t a, uint32_t b) {
   double x = leaves[a].lower[axis] + leaves[a].upper[axis], y = leaves[b].lower[axis] + leaves[b].upper[axis];
   return x < y || (!(y < x) && a < b);
 }
 
 /* Partial sort: order[mid] gets what belongs there, smaller ones before it [Hoare 1961]. */
-static void select_middle(const net_box3 *leaves, int axis, uint32_t *order, size_t from, size_t to, size_t mid) {
+static void select_middle(const box3 *leaves, int axis, uint32_t *order, size_t from, size_t to, size_t mid) {
   while (to - from > 1) {
     uint32_t pivot = order[from + (to - from) / 2];
     size_t i = from, j = to - 1;
@@ -62,7 +48,7 @@ static void select_middle(const net_box3 *leaves, int axis, uint32_t *order, siz
   }
 }
 
-static int longest_axis(const net_box3 *leaves, const uint32_t *order, size_t from, size_t to) {
+static int longest_axis(const box3 *leaves, const uint32_t *order, size_t from, size_t to) {
   double lower[3] = {INFINITY, INFINITY, INFINITY}, upper[3] = {-INFINITY, -INFINITY, -INFINITY};
   for (size_t i = from; i < to; i++)
     for (int d = 0; d < 3; d++) {
@@ -80,8 +66,8 @@ typedef struct range {
   size_t node, from, to;
 } range;
 
-/* Orders the patches, and puts each leaf's box in its place. */
-static void sort_patches(const net_box3 *leaves, net_patch_tree *tree) {
+/* Orders the boxes, and puts each leaf's box in its place. */
+static void sort_boxes(const box3 *leaves, box_tree *tree) {
   range stack[STACK] = {{0, 0, tree->count}};
   size_t height = 1;
   while (height > 0) {
@@ -98,7 +84,7 @@ static void sort_patches(const net_box3 *leaves, net_patch_tree *tree) {
 }
 
 /* A node is joined when it comes up again after its children. */
-static void join_boxes(net_patch_tree *tree) {
+static void join_boxes(box_tree *tree) {
   range stack[2 * STACK] = {{0, 0, tree->count}};
   bool again[2 * STACK] = {false};
   size_t height = 1;
@@ -118,30 +104,35 @@ static void join_boxes(net_patch_tree *tree) {
   }
 }
 
-void net_patch_tree_free(batten_context *ctx, net_patch_tree *tree) {
+void box_tree_free(batten_context *ctx, box_tree *tree) {
   batten_free(ctx, tree->boxes);
   batten_free(ctx, tree->order);
 }
 
-batten_status net_patch_tree_make(batten_context *ctx, const batten_network *network, net_patch_tree *out) {
-  size_t count = network->patch_count;
-  *out = (net_patch_tree){.count = count};
-  net_box3 *leaves = batten_alloc_array(ctx, count, sizeof *leaves);
-  out->order = leaves ? batten_alloc_array(ctx, count, sizeof *out->order) : NULL;
-  out->boxes = out->order ? batten_alloc_array(ctx, 2 * count, sizeof *out->boxes) : NULL;
-  if (out->boxes && count) {
-    for (size_t p = 0; p < count; p++) {
-      leaves[p] = box_of_patch(network, p);
-      out->order[p] = (uint32_t)p;
-    }
-    sort_patches(leaves, out);
+batten_status box_tree_make(batten_context *ctx, size_t count, const box3 *leaves, box_tree *out) {
+  *out = (box_tree){.count = count};
+  out->order = batten_alloc_array(ctx, count, sizeof *out->order);
+  out->boxes = out->order ? batten_alloc_array(ctx, count, 2 * sizeof *out->boxes) : NULL;
+  if (!out->boxes) return BATTEN_E_NOMEM;
+  for (size_t i = 0; i < count; i++) out->order[i] = (uint32_t)i;
+  if (count) {
+    sort_boxes(leaves, out);
     join_boxes(out);
   }
-  batten_free(ctx, leaves);
-  return out->boxes ? BATTEN_OK : BATTEN_E_NOMEM;
+  return BATTEN_OK;
 }
 
-double net_box3_distance2(const net_box3 *box, const double *point) {
+box3 box3_of_points(size_t count, const double (*points)[3]) {
+  box3 b = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+  for (size_t i = 0; i < count; i++)
+    for (int d = 0; d < 3; d++) {
+      b.lower[d] = fmin(b.lower[d], points[i][d]);
+      b.upper[d] = fmax(b.upper[d], points[i][d]);
+    }
+  return b;
+}
+
+double box3_distance2(const box3 *box, const double *point) {
   double sum = 0;
   for (int d = 0; d < 3; d++) {
     double out = fmax(0, fmax(box->lower[d] - point[d], point[d] - box->upper[d]));
