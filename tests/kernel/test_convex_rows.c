@@ -240,7 +240,295 @@ static void test_polyhedra(void) {
   batten_context_free(ctx);
 }
 
+/* ---- tests that the tests above bite ------------------------------------------------------------- */
+
+/* Rows of one box stand in the order x_u, x_v, forms. Without any of the three classes, or without one direction's
+ * forms, some corner of the polyhedron is not convex. */
+static void test_all_needed(void) {
+  batten_context *ctx = plain();
+  uint64_t seed = 21;
+  scene *s = malloc(sizeof *s);
+  unsigned degree[2] = {3, 3}, smoothness[2] = {2, 2};
+  size_t spans[2] = {1, 1};
+  set_space(s, degree, smoothness, spans);
+  set_cap(s, 0.8, 0, &seed);
+  bool accepted;
+  convex_rows rows;
+  T_OK(convex_rows_make(ctx, &s->space, s->reference[0], &defaults, &accepted, &rows), ctx);
+  T_CHECK(accepted && rows.boxes == 1 && rows.depth == 0 && rows.matrix.rows == 352 && rows.matrix.columns == 48,
+          "a bicubic cap: 352 rows, here %zu", rows.matrix.rows);
+  double x[48], direction[48], *part = malloc(352 * 48 * sizeof *part), lower[352];
+  for (int without = -1; without < 7; without++) {
+    size_t count = 0;
+    for (size_t i = 0; i < 352; i++) {
+      int kind = i < 48 ? 0 : i < 96 ? 1 : 2;
+      int rank = kind == 2 ? (int)((i - 96) / 4 % 4) : -1; /* of the direction */
+      if (kind == without || (without >= 3 && rank == without - 3)) continue;
+      memcpy(part + 48 * count, rows.matrix.dense + 48 * i, 48 * sizeof *part);
+      lower[count++] = rows.lower[i];
+    }
+    convex_rows fewer = {.matrix = batten_matrix_dense(count, 48, part), .lower = lower};
+    double least = INFINITY;
+    for (int k = 0; k < 12; k++) {
+      for (int i = 0; i < 48; i++) direction[i] = normal(&seed);
+      if (corner(ctx, &fewer, s->reference[0], direction, 0.3, x))
+        least = fmin(least, least_definite(s, x, rows.sign, 12));
+    }
+    static const char *const names[] = {"all rows",
+                                        "rows but those of x_u",
+                                        "rows but those of x_v",
+                                        "rows but forms",
+                                        "rows but direction 0",
+                                        "rows but direction 1",
+                                        "rows but direction 2",
+                                        "rows but direction 3"};
+    T_CHECK((least > 0) == (without < 0), "%zu %s: %.3g", count, names[without + 1], least);
+  }
+  free(part);
+  convex_rows_free(ctx, &rows);
+  free(s);
+  batten_context_free(ctx);
+}
+
+/* A symmetric matrix with z_a'H z_(a+1) >= 0 over a half turn is semidefinite, for any angles below a half turn. */
+static void test_theorem(void) {
+  uint64_t seed = 31;
+  size_t tried = 0, held = 0, wrong = 0;
+  double nearest = INFINITY;
+  for (int P = 3; P <= 16; P++)
+    for (int k = 0; k < 4000; k++, tried++) {
+      double z[17][2], r[4], h[3] = {normal(&seed), normal(&seed), normal(&seed)};
+      if (k % 2) { /* near the border of definite ones */
+        h[0] = r[0] = normal(&seed), r[1] = normal(&seed), r[2] = 0.3 * normal(&seed);
+        h[0] = r[0] * r[0] + r[2], h[1] = r[0] * r[1], h[2] = r[1] * r[1] + 0.3 * normal(&seed);
+      }
+      for (int i = 0; i < 4; i++) r[i] = normal(&seed);
+      for (int a = 0; a <= P; a++) {
+        double angle = acos(-1) * a / P;
+        z[a][0] = r[0] * cos(angle) + r[1] * sin(angle);
+        z[a][1] = r[2] * cos(angle) + r[3] * sin(angle);
+      }
+      bool holds = true;
+      for (int a = 0; a < P; a++)
+        holds = holds && h[0] * z[a][0] * z[a + 1][0] + h[1] * (z[a][0] * z[a + 1][1] + z[a][1] * z[a + 1][0]) +
+                                 h[2] * z[a][1] * z[a + 1][1] >=
+                             0;
+      if (!holds) continue;
+      held++;
+      double least = (h[0] + h[2] - hypot(h[0] - h[2], 2 * h[1])) / 2;
+      nearest = fmin(nearest, fabs(least));
+      if (least < -1e-12 * (fabs(h[0]) + fabs(h[2]))) wrong++;
+    }
+  T_CHECK(wrong == 0 && held > 1000, "%zu of %zu matrices have P forms >= 0, all are semidefinite; nearest %.2g",
+          held, tried, nearest);
+}
+
+/* ---- invariances --------------------------------------------------------------------------------- */
+
+static void set_kind(scene *s, int kind, uint64_t *seed) {
+  unsigned degree[2] = {3, kind ? 4 : 3}, smoothness[2] = {2, 2};
+  size_t spans[2] = {kind ? 2 : 1, 1};
+  set_space(s, degree, smoothness, spans);
+  set_cap(s, 1.5, 0.003, seed);
+}
+
+static void test_invariance(void) {
+  batten_context *ctx = plain();
+  uint64_t seed = 41;
+  scene *s = malloc(sizeof *s), *t = malloc(sizeof *t);
+  for (int kind = 0; kind < 2; kind++) {
+    bool accepted, accepted_too;
+    convex_rows rows, others;
+    do {
+      set_kind(s, kind, &seed);
+      convex_rows_make(ctx, &s->space, s->reference[0], &defaults, &accepted, NULL);
+    } while (!accepted);
+    convex_rows_make(ctx, &s->space, s->reference[0], &defaults, &accepted, &rows);
+    size_t n = rows.matrix.columns, points = n / 3;
+    size_t entries = kind ? rows.matrix.starts[rows.matrix.rows] : rows.matrix.rows * n;
+    T_CHECK((rows.matrix.dense == NULL) == (kind != 0), "one span pair is dense, others sparse: %zu boxes, depth %u",
+            rows.boxes, rows.depth);
+
+    for (int exponent = -61; exponent <= 60; exponent += 11) {
+      *t = *s;
+      for (size_t i = 0; i < n; i++) t->reference[0][i] = ldexp(s->reference[0][i], exponent);
+      convex_rows_make(ctx, &s->space, t->reference[0], &defaults, &accepted_too, &others);
+      bool same = accepted_too && others.matrix.rows == rows.matrix.rows && others.boxes == rows.boxes;
+      same = same && memcmp(kind ? others.matrix.values : others.matrix.dense,
+                            kind ? rows.matrix.values : rows.matrix.dense, entries * sizeof(double)) == 0;
+      for (size_t i = 0; same && i < rows.matrix.rows; i++) same = others.lower[i] == ldexp(rows.lower[i], exponent);
+      T_CHECK(same, "scaled by 2^%d: the same bits", exponent);
+      if (accepted_too) convex_rows_free(ctx, &others);
+    }
+
+    for (int k = 0; k < 3; k++) { /* turned about some axis, moved, and reversed */
+      double c = cos(k + 0.3), d = sin(k + 0.3);
+      *t = *s;
+      for (size_t i = 0; i < points; i++) {
+        double *p = t->reference[i], a = p[k % 3], b = p[(k + 1) % 3];
+        p[k % 3] = c * a - d * b + 0.7;
+        p[(k + 1) % 3] = d * a + c * b - 3;
+      }
+      convex_rows_make(ctx, &s->space, t->reference[0], &defaults, &accepted_too, &others);
+      T_CHECK(accepted_too && others.boxes == rows.boxes && others.depth == rows.depth && others.sign == rows.sign &&
+                  others.matrix.rows == rows.matrix.rows,
+              "turned and moved: %zu boxes, %zu rows", others.boxes, others.matrix.rows);
+      convex_rows_free(ctx, &others);
+    }
+    for (size_t i = 0; i < points; i++) {
+      memcpy(t->reference[i], s->reference[i], sizeof t->reference[i]);
+      t->reference[i][2] = -t->reference[i][2];
+    }
+    convex_rows_make(ctx, &s->space, t->reference[0], &defaults, &accepted_too, &others);
+    T_CHECK(accepted_too && others.boxes == rows.boxes && others.sign == -rows.sign, "mirrored: the other sign");
+    convex_rows_free(ctx, &others);
+
+    /* u and v change places: the same rows with columns permuted, in another order. */
+    for (int d = 0; d < 2; d++) {
+      memcpy(t->knots[d], s->knots[1 - d], sizeof t->knots[d]);
+      t->space.axis[d] = s->space.axis[1 - d];
+      t->space.axis[d].knots = t->knots[d];
+    }
+    size_t n0 = s->space.axis[0].count, n1 = s->space.axis[1].count;
+    for (size_t i = 0; i < n0; i++)
+      for (size_t j = 0; j < n1; j++) memcpy(t->reference[j * n0 + i], s->reference[i * n1 + j], 3 * sizeof(double));
+    convex_rows_make(ctx, &t->space, t->reference[0], &defaults, &accepted_too, &others);
+    T_CHECK(accepted_too && others.boxes == rows.boxes && others.sign == -rows.sign &&
+                others.matrix.rows == rows.matrix.rows,
+            "u and v change places: %zu boxes, sign %d", others.boxes, others.sign);
+    /* The same polyhedron: it ends at the same place in any direction. */
+    double worst = 0, *direction = malloc(2 * n * sizeof *direction);
+    for (int k = 0; k < 20; k++) {
+      for (size_t i = 0; i < n0; i++)
+        for (size_t j = 0; j < n1; j++)
+          for (size_t e = 0; e < 3; e++)
+            direction[3 * (i * n1 + j) + e] = direction[n + 3 * (j * n0 + i) + e] = normal(&seed);
+      double one = reach(&rows, s->reference[0], direction, 10),
+             other = reach(&others, t->reference[0], direction + n, 10);
+      worst = fmax(worst, fabs(one - other) / one);
+    }
+    T_RATIO(worst, 1e-9, "the polyhedra with u and v changed agree");
+    free(direction);
+    convex_rows_free(ctx, &others);
+
+    size_t twice = 0;
+    for (size_t i = 0; !kind && i < rows.matrix.rows; i++)
+      for (size_t j = 0; j < i; j++)
+        if (memcmp(rows.matrix.dense + i * n, rows.matrix.dense + j * n, n * sizeof(double)) == 0) twice++;
+    T_CHECK(twice == 0, "no row is there twice");
+    convex_rows_free(ctx, &rows);
+  }
+  free(s);
+  free(t);
+  batten_context_free(ctx);
+}
+
+/* ---- what is refused ----------------------------------------------------------------------------- */
+
+static bool is_accepted(batten_context *ctx, const scene *s, const convex_row_options *opt) {
+  bool accepted = true;
+  convex_rows rows = {.boxes = 77};
+  batten_status status = convex_rows_make(ctx, &s->space, s->reference[0], opt, &accepted, &rows);
+  if (status < 0) return false;
+  if (accepted)
+    convex_rows_free(ctx, &rows);
+  else if (rows.boxes != 77)
+    T_CHECK(false, "what is refused writes nothing");
+  return accepted;
+}
+
+static void test_refused(void) {
+  batten_context *ctx = plain();
+  uint64_t seed = 51;
+  scene *s = malloc(sizeof *s);
+  unsigned degree[2] = {3, 3}, smoothness[2] = {2, 2};
+  size_t spans[2] = {1, 2};
+  set_space(s, degree, smoothness, spans);
+  double u[KNOTS], v[KNOTS];
+  bspline_greville(&s->space.axis[0], u);
+  bspline_greville(&s->space.axis[1], v);
+  static const char *const names[] = {"paraboloid", "saddle",    "plane",
+                                      "cylinder",   "one point", "line",
+                                      "wavy sheet", "no number", "convex but for one corner"};
+  for (int kind = 0; kind < 9; kind++) {
+    for (size_t i = 0; i < s->space.axis[0].count; i++)
+      for (size_t j = 0; j < s->space.axis[1].count; j++) {
+        double x = u[i] - 0.5, y = v[j] - 0.5, z = x * x + y * y;
+        if (kind == 1) z = x * x - y * y;
+        if (kind == 2) z = 0.3 * x - y;
+        if (kind == 3) z = x * x;
+        if (kind == 4) x = y = z = 1;
+        if (kind == 5) y = z = x;
+        if (kind == 6) z = (i + j) % 2 ? 0.1 : 0;
+        if (kind == 7 && i == 2 && j == 2) z = NAN;
+        if (kind == 8 && i == 0 && j == 0) z -= 0.3;
+        double p[3] = {x, y, z};
+        memcpy(s->reference[i * s->space.axis[1].count + j], p, sizeof p);
+      }
+    T_CHECK(is_accepted(ctx, s, &defaults) == (kind == 0), "%s: %s", names[kind], kind ? "refused" : "accepted");
+  }
+
+  /* Limits: a surface that needs bisection. */
+  bool accepted;
+  convex_rows rows = {0};
+  do {
+    convex_rows_free(ctx, &rows);
+    set_cap(s, 1.5, 0.004, &seed);
+    convex_rows_make(ctx, &s->space, s->reference[0], &defaults, &accepted, &rows);
+  } while (!accepted || rows.depth == 0);
+  size_t count = rows.matrix.rows;
+  unsigned depth = rows.depth;
+  T_CHECK(accepted && depth > 0 && rows.boxes > 2, "a cap that needs bisection: %zu boxes, %zu rows, depth %u",
+          rows.boxes, count, depth);
+  convex_rows_free(ctx, &rows);
+  convex_row_options o = defaults;
+  o.row_limit = count;
+  T_CHECK(is_accepted(ctx, s, &o), "row_limit %zu", count);
+  o.row_limit = count - 1;
+  T_CHECK(!is_accepted(ctx, s, &o), "row_limit %zu", count - 1);
+  for (o = defaults, o.depth_max = 0; o.depth_max <= depth; o.depth_max++) {
+    bool enough = is_accepted(ctx, s, &o);
+    T_CHECK(enough || o.depth_max < depth, "depth_max %u: %s", o.depth_max, enough ? "accepted" : "refused");
+    T_CHECK(!enough || o.depth_max > 0, "no depth, no bisection");
+  }
+  for (unsigned directions = 3; directions <= 16; directions += directions < 8 ? 1 : 4) {
+    o = defaults;
+    o.directions = directions;
+    convex_rows_make(ctx, &s->space, s->reference[0], &o, &accepted, &rows);
+    printf("# %u directions: %zu boxes, %zu rows\n", directions, rows.boxes, rows.matrix.rows);
+    T_CHECK(accepted, "%u directions", directions);
+    if (accepted) convex_rows_free(ctx, &rows);
+  }
+  free(s);
+  batten_context_free(ctx);
+}
+
+static batten_status make(batten_context *ctx, void *arg) {
+  scene *s = arg;
+  bool accepted;
+  convex_rows rows;
+  batten_status status = convex_rows_make(ctx, &s->space, s->reference[0], &defaults, &accepted, &rows);
+  if (status == BATTEN_OK) convex_rows_free(ctx, &rows);
+  return status;
+}
+
+static void test_memory(void) {
+  uint64_t seed = 61;
+  scene *s = malloc(sizeof *s);
+  for (int kind = 0; kind < 2; kind++) {
+    set_kind(s, kind, &seed);
+    set_cap(s, 1, 0, &seed);
+    t_fail_every_allocation(kind ? "sparse rows" : "dense rows", make, s);
+  }
+  free(s);
+}
+
 int main(void) {
   test_polyhedra();
+  test_all_needed();
+  test_theorem();
+  test_invariance();
+  test_refused();
+  test_memory();
   return t_done();
 }
