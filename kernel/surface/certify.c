@@ -1,0 +1,319 @@
+/* The proof that a surface is convex, by Bernstein coefficients of D = L'N' - M'^2.
+ *
+ * With L' = x_uu . (x_u x x_v), M' and N' likewise and V = |x_u x x_v|^4 the Gaussian curvature is K = D / V. On each
+ * span pair D - kappa V is shown to be positive, kappa a share of the least K that was met: then D > 0, so that x_u x
+ * x_v vanishes nowhere and K > kappa > 0; and L' has one sign, since L'N' > M'^2 lets it vanish nowhere either. One
+ * value of it tells which. Degrees: L' (3m-3, 3n-1), M' (3m-2, 3n-2), N' (3m-1, 3n-3), D (6m-4, 6n-4), V (8m-4,
+ * 8n-4). Points are multiplied by a power of two, and so are the parameters: that changes no digit. */
+#include "certify.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/checked.h"
+#include "mesh/vec.h"
+
+enum { NORMALS = 5 }; /* in either direction on a span pair */
+
+typedef struct certifier {
+  batten_context *ctx;
+  const batten_surface *surface;
+  const batten_convexity_options *opt;
+  double unit;     /* that points are multiplied by */
+  double rounding; /* of the control points themselves, times unit */
+  size_t spans[2];
+  unsigned degree[2]; /* of the jets */
+  double *block;      /* everything below */
+  double *room;       /* of a jet */
+  certify_jet jet;
+  certify_poly cross[3], form[3], square, determinant; /* x_u x x_v, (L', M', N'), |x_u x x_v|^2, D */
+  double *slots, *work, *faces;
+  double (*normals)[3]; /* [spans][NORMALS * NORMALS], as many as there are */
+  size_t normal_count;
+} certifier;
+
+/* What was found with L', M', N' multiplied by one sign. */
+typedef struct verdict {
+  certify_proof proof;
+  bool certified, flat;
+  int sign; /* that L' has, times the sign; 2 while there is none, 0 when it is not one */
+} verdict;
+
+batten_convexity_options batten_convexity_options_default(void) {
+  return (batten_convexity_options){
+      .struct_size = sizeof(batten_convexity_options), .depth_max = 20, .box_limit = 1000000};
+}
+
+static batten_status check(batten_context *ctx, const batten_surface *surface, const batten_convexity_options *opt,
+                           const batten_convexity *out) {
+  if (!surface || !out)
+    return batten_fail(ctx, BATTEN_E_INVALID, "%s: NULL; give a surface and room for the result",
+                       surface ? "out" : "surface");
+  batten_status st = batten_check_struct(ctx, "batten_convexity_options", opt->struct_size, sizeof *opt);
+  if (st < 0) return st;
+  if (!(opt->slack >= 0) || isinf(opt->slack))
+    return batten_fail(ctx, BATTEN_E_INVALID, "opt.slack: %g; give 0 or more", opt->slack);
+  if (opt->depth_max > 30)
+    return batten_fail(ctx, BATTEN_E_INVALID, "opt.depth_max: %u; give 0 to 30", opt->depth_max);
+  if (opt->box_limit < 1) return batten_fail(ctx, BATTEN_E_INVALID, "opt.box_limit: 0; give 1 or more");
+  size_t spans[2] = {bspline_span_count(&surface->space[0]), bspline_span_count(&surface->space[1])};
+  for (size_t k = 0; opt->signs && k < spans[0] * spans[1]; k++)
+    if (opt->signs[k] < -1 || opt->signs[k] > 1)
+      return batten_fail(ctx, BATTEN_E_INVALID, "opt.signs[%zu][%zu]: %d; give -1, 0 or 1", k / spans[1],
+                         k % spans[1], opt->signs[k]);
+  return BATTEN_OK;
+}
+
+/* The power of two that brings the points' box to size 1. */
+static void find_unit(certifier *c) {
+  const batten_surface *s = c->surface;
+  size_t count = s->space[0].count * s->space[1].count;
+  double size = 0, most = 0;
+  for (int x = 0; x < 3; x++) {
+    double low = INFINITY, high = -INFINITY;
+    for (size_t i = 0; i < count; i++) {
+      low = fmin(low, s->control_points[3 * i + (size_t)x]);
+      high = fmax(high, s->control_points[3 * i + (size_t)x]);
+    }
+    size = fmax(size, 0.5 * high - 0.5 * low);
+    most = fmax(most, fmax(fabs(low), fabs(high)));
+  }
+  c->unit = size > 0 ? 0.5 * batten_unit(size) : 1;
+  c->rounding = 4 * CERTIFY_EPS * c->unit * most;
+}
+
+/* Takes count doubles of the block, which may be NULL when only their number is asked for. */
+static double *take(certifier *c, size_t *used, size_t count) {
+  double *at = c->block ? c->block + *used : NULL;
+  batten_add(*used, count, used);
+  return at;
+}
+
+/* Hands the block out, or only counts. */
+static size_t lay_out(certifier *c) {
+  size_t used = 0, m = c->degree[0], n = c->degree[1], slots, pairs;
+  size_t full = 2 * (8 * m - 3) * (8 * n - 3);
+  c->room = take(c, &used, CERTIFY_JET_DOUBLES);
+  for (int x = 0; x < 3; x++) c->cross[x].c = take(c, &used, 4 * m * n);
+  for (int k = 0; k < 3; k++) c->form[k].c = take(c, &used, 9 * m * n);
+  c->square.c = take(c, &used, (4 * m - 1) * (4 * n - 1));
+  c->determinant.c = take(c, &used, (6 * m - 3) * (6 * n - 3));
+  c->faces = take(c, &used, CERTIFY_FACES_DOUBLES);
+  c->work = take(c, &used, full);
+  batten_mul(2 * (size_t)c->opt->depth_max + 2, full, &slots);
+  c->slots = take(c, &used, slots);
+  batten_mul3(c->spans[0], c->spans[1], 3 * NORMALS * NORMALS, &pairs);
+  c->normals = (double(*)[3])take(c, &used, pairs);
+  return used;
+}
+
+/* ---- one span pair -------------------------------------------------------------------------------- */
+
+/* Jet, cross product and forms; data_error as in certify_jet_make. */
+static void make_forms(certifier *c, size_t mu, size_t nu, double data_error) {
+  static const int second[3] = {CERTIFY_UU, CERTIFY_UV, CERTIFY_VV};
+  unsigned m = c->degree[0], n = c->degree[1];
+  certify_jet_make(c->surface, mu, nu, c->unit, data_error, c->room, &c->jet);
+  certify_cross(&c->jet, c->cross);
+  for (unsigned k = 0; k < 3; k++) {
+    certify_clear(&c->form[k], 3 * m - 3 + k, 3 * n - 1 - k);
+    for (int x = 0; x < 3; x++) certify_add_product(&c->form[k], 1, &c->jet.part[second[k]][x], &c->cross[x], 3);
+    certify_summed(&c->form[k]);
+  }
+}
+
+static bool forms_vanish(const certifier *c) {
+  for (int k = 0; k < 3; k++)
+    if (c->form[k].most > c->form[k].error) return false;
+  return true;
+}
+
+/* To rounding of the control points too. Leaves the forms as they were. */
+static bool is_flat(certifier *c, size_t mu, size_t nu) {
+  /* 1e-3: no rounding makes more of points of size 1 unless they are so far away that nothing is left of them. */
+  double most = fmax(c->form[0].most, fmax(c->form[1].most, c->form[2].most));
+  if (forms_vanish(c)) return true;
+  if (most > 1e-3) return false;
+  make_forms(c, mu, nu, c->rounding);
+  bool flat = forms_vanish(c);
+  make_forms(c, mu, nu, 0);
+  return flat;
+}
+
+static void collect_normals(certifier *c) {
+  for (int i = 0; i < NORMALS; i++)
+    for (int j = 0; j < NORMALS; j++) {
+      double normal[3];
+      for (int x = 0; x < 3; x++)
+        normal[x] = certify_value(&c->cross[x], true, i / (NORMALS - 1.0), j / (NORMALS - 1.0));
+      if (vec_normalize(normal)) memcpy(c->normals[c->normal_count++], normal, sizeof normal);
+    }
+}
+
+/* The slack in the units of the jet's L' and N', not above it; a slack too large for a double is cut. */
+static double local_slack(const certifier *c, int direction) {
+  double slack = c->opt->slack, factor = c->unit;
+  const double along = c->jet.factor[direction], across = c->jet.factor[1 - direction];
+  const double parts[] = {factor, factor, factor, along, along, along, across};
+  for (size_t k = 0; k < sizeof parts / sizeof *parts; k++) slack *= parts[k];
+  return isnan(slack) ? 0 : fmin(slack * (1 - 0x1p-40), 0x1p100);
+}
+
+/* The forms times sign, and with the slack. */
+static void apply_slack(certifier *c, int sign) {
+  if (!(c->opt->slack > 0)) return;
+  for (int k = 0; k < 3; k++)
+    for (size_t x = 0; x < certify_count(&c->form[k]) && sign < 0; x++) c->form[k].c[x] = -c->form[k].c[x];
+  certify_add_constant(&c->form[0], local_slack(c, 0));
+  certify_add_constant(&c->form[2], local_slack(c, 1));
+}
+
+/* D and V of the span pair into the square's first slot. */
+static void make_square(certifier *c, size_t mu, size_t nu, certify_square *s) {
+  unsigned m = c->degree[0], n = c->degree[1];
+  certify_clear(&c->determinant, 6 * m - 4, 6 * n - 4);
+  certify_add_product(&c->determinant, 1, &c->form[0], &c->form[2], 2);
+  certify_add_product(&c->determinant, -1, &c->form[1], &c->form[1], 2);
+  certify_summed(&c->determinant);
+  certify_clear(&c->square, 4 * m - 2, 4 * n - 2);
+  for (int x = 0; x < 3; x++) certify_add_product(&c->square, 1, &c->cross[x], &c->cross[x], 3);
+  certify_summed(&c->square);
+  certify_poly d = {.c = c->slots}, v = {.c = c->slots + (size_t)(8 * m - 3) * (8 * n - 3)};
+  certify_raise(&c->determinant, 8 * m - 4, 8 * n - 4, c->work, &d);
+  certify_unscale(&d);
+  certify_clear(&v, 8 * m - 4, 8 * n - 4);
+  certify_add_product(&v, 1, &c->square, &c->square, 1);
+  certify_unscale(&v);
+  *s = (certify_square){
+      .degree = {d.degree[0], d.degree[1]}, .error = {d.error, v.error}, .slots = c->slots, .work = c->work};
+  for (int i = 0; i < 2; i++) {
+    const double *knots = c->surface->space[i].knots + (i == 0 ? mu : nu);
+    s->lower[i] = knots[0];
+    s->upper[i] = knots[1];
+  }
+}
+
+/* The sign of the diagonal forms at the corner where one is largest, 0 when that is not beyond rounding. */
+static int sign_of_forms(const certifier *c) {
+  double largest = 0;
+  for (int k = 0; k < 3; k += 2) {
+    const certify_poly *f = &c->form[k];
+    size_t n = certify_count(f), columns = f->degree[1] + 1;
+    const double corners[4] = {f->c[0], f->c[columns - 1], f->c[n - columns], f->c[n - 1]};
+    for (int i = 0; i < 4; i++)
+      if (fabs(corners[i]) > f->error && fabs(corners[i]) > fabs(largest)) largest = corners[i];
+  }
+  return (largest > 0) - (largest < 0);
+}
+
+/* ---- all span pairs -------------------------------------------------------------------------------- */
+
+/* asked: what is to be shown of the span pair, 0 nothing; either: the sign is free but must be one. */
+static batten_status certify_pair(certifier *c, size_t mu, size_t nu, int asked, bool either, verdict *v) {
+  make_forms(c, mu, nu, 0);
+  collect_normals(c);
+  v->flat = v->flat && is_flat(c, mu, nu);
+  if (asked == 0) return BATTEN_OK;
+  certify_square s;
+  apply_slack(c, asked);
+  make_square(c, mu, nu, &s);
+  certify_sample(&v->proof, &s);
+  if (!v->certified) return BATTEN_OK; /* only what is met */
+  batten_status st = certify_prove(c->ctx, &v->proof, &s);
+  if (st < 0) return st;
+  int sign = sign_of_forms(c);
+  int expected = c->opt->slack > 0 ? 1 : either ? (v->sign == 2 ? sign : v->sign) : asked;
+  v->certified = v->proof.unproven == 0 && sign != 0 && sign == expected;
+  if (v->sign == 2) v->sign = c->opt->slack > 0 ? asked : sign;
+  return BATTEN_OK;
+}
+
+/* sign: of the forms where one sign is free. */
+static batten_status certify_all(certifier *c, int sign, verdict *v) {
+  const bspline *u = &c->surface->space[0], *w = &c->surface->space[1];
+  const signed char *signs = c->opt->signs;
+  *v = (verdict){.certified = true, .flat = true, .sign = 2};
+  v->proof = (certify_proof){
+      .depth_max = c->opt->depth_max, .box_limit = c->opt->box_limit, .least = INFINITY, .bound = INFINITY};
+  c->normal_count = 0;
+  double pairs = (double)c->spans[0] * (double)c->spans[1], done = 0;
+  size_t at = 0;
+  for (size_t mu = bspline_first(u); mu < u->count; mu = bspline_next(u, mu))
+    for (size_t nu = bspline_first(w); nu < w->count; nu = bspline_next(w, nu), at++) {
+      v->proof.progress[0] = done++ / pairs;
+      v->proof.progress[1] = done / pairs;
+      batten_status st = batten_progress(c->ctx, "certify", v->proof.progress[0]);
+      if (st >= 0) st = certify_pair(c, mu, nu, signs ? signs[at] : sign, !signs, v);
+      if (st < 0) return st;
+    }
+  return BATTEN_OK;
+}
+
+static bool prove_graph(certifier *c, double direction[3]) {
+  const bspline *u = &c->surface->space[0], *w = &c->surface->space[1];
+  if (!certify_direction(c->normal_count, (const double(*)[3])c->normals, direction)) return false;
+  for (size_t mu = bspline_first(u); mu < u->count; mu = bspline_next(u, mu))
+    for (size_t nu = bspline_first(w); nu < w->count; nu = bspline_next(w, nu)) {
+      certify_jet_make(c->surface, mu, nu, c->unit, 0, c->room, &c->jet);
+      certify_cross(&c->jet, c->cross);
+      if (!certify_faces(c->cross, direction, c->faces)) return false;
+    }
+  return true;
+}
+
+/* The one sign that was asked for, 0 when there are both or none. */
+static int common_sign(const certifier *c) {
+  int sign = 0;
+  for (size_t k = 0; k < c->spans[0] * c->spans[1]; k++) {
+    int s = c->opt->signs[k];
+    if (s != 0 && sign != 0 && s != sign) return 0;
+    if (s != 0) sign = s;
+  }
+  return sign;
+}
+
+static void report(certifier *c, const verdict *v, batten_convexity *out) {
+  const certify_proof *p = &v->proof;
+  double scale = c->unit * c->unit, least = p->least;
+  batten_convexity r = {.certified = v->certified,
+                        .flat = v->flat,
+                        .boxes = p->boxes,
+                        .depth = p->depth,
+                        .unproven = p->unproven,
+                        .worst_at = {p->least_at[0], p->least_at[1]}};
+  if (v->certified)
+    r.margin_min = isfinite(least) ? fmin(CERTIFY_SHARE * least, p->bound) * scale : 0;
+  else
+    r.margin_min = fmin(least, 0) * scale;
+  if (v->certified) r.sign = c->opt->signs ? common_sign(c) : v->sign == 2 ? 0 : v->sign;
+  r.graph = prove_graph(c, r.direction);
+  if (!r.graph) memset(r.direction, 0, sizeof r.direction);
+  *out = r;
+}
+
+batten_status batten_surface_certify_convex(batten_context *ctx, const batten_surface *surface,
+                                            const batten_convexity_options *opt, batten_convexity *out) {
+  if (!ctx) return BATTEN_E_INVALID;
+  batten_convexity_options defaults = batten_convexity_options_default();
+  if (!opt) opt = &defaults;
+  batten_status st = check(ctx, surface, opt, out);
+  if (st < 0) return st;
+  certifier c = {.ctx = ctx, .surface = surface, .opt = opt};
+  for (int i = 0; i < 2; i++) {
+    c.spans[i] = bspline_span_count(&surface->space[i]);
+    c.degree[i] = surface->space[i].degree < 2 ? 2 : surface->space[i].degree;
+  }
+  find_unit(&c);
+  c.block = batten_alloc_array(ctx, lay_out(&c), sizeof *c.block);
+  if (!c.block) return BATTEN_E_NOMEM;
+  lay_out(&c);
+  verdict v, other;
+  st = certify_all(&c, 1, &v);
+  if (st >= 0 && !opt->signs && opt->slack > 0 && !v.certified) { /* then the other sign */
+    st = certify_all(&c, -1, &other);
+    if (st >= 0 && other.certified) v = other;
+  }
+  if (st >= 0) report(&c, &v, out);
+  batten_free(ctx, c.block);
+  return st;
+}
