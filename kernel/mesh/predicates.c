@@ -1,16 +1,18 @@
-/* Orientation tests: a filter in doubles, and expansion arithmetic when it cannot tell (Shewchuk 1997, "Adaptive
- * precision floating-point arithmetic and fast robust geometric predicates").
+/* Orientation and circle tests: a filter in doubles, and expansion arithmetic when it cannot tell (Shewchuk 1997,
+ * "Adaptive precision floating-point arithmetic and fast robust geometric predicates").
  *
  * An expansion is a sum of doubles, least first, whose pieces do not overlap; the sign of the last one is the sign of
  * the sum. A coordinate difference is an expansion of 2 pieces, a product with one of them doubles the pieces twice,
- * so a 3 x 3 determinant of differences has at most 192. */
+ * so a 3 x 3 determinant of differences has at most 192. The circle's determinant, of degree 4, would have 1536; it
+ * is compressed on the way: then each piece is below half a unit in the last place of the next, and some 2100 powers
+ * of two have room for no more than 42. */
 #include "predicates.h"
 
 #include <float.h>
 #include <math.h>
 #include <stddef.h>
 
-enum { PRODUCT2 = 8, MINOR = 16, TERM = 64, DETERMINANT = 192 };
+enum { PRODUCT2 = 8, MINOR = 16, TERM = 64, DETERMINANT = 192, COMPRESSED = 48 };
 
 typedef struct two {
   double low, high;
@@ -120,4 +122,85 @@ int batten_orient3d(const double *a, const double *b, const double *c, const dou
     count = add(count, total, n, term);
   }
   return sign_of(count, total);
+}
+
+/* The same sum in as few pieces as its digits need, in place [Shewchuk 1997, figure 15]. */
+static size_t compress(size_t n, double *e) {
+  if (n < 2) return n;
+  size_t bottom = n - 1, count = 0;
+  double sum = e[n - 1];
+  for (size_t i = n - 1; i-- > 0;) {
+    two s = two_sum(sum, e[i]);
+    sum = s.high;
+    if (s.low == 0) continue;
+    e[bottom--] = s.high;
+    sum = s.low;
+  }
+  e[bottom] = sum;
+  sum = e[bottom];
+  for (size_t i = bottom + 1; i < n; i++) {
+    two s = two_sum(e[i], sum);
+    if (s.low != 0) e[count++] = s.low;
+    sum = s.high;
+  }
+  e[count++] = sum;
+  return count;
+}
+
+/* h [2 COMPRESSED] = e * b^2, compressed. */
+static size_t multiply_square(size_t n, const double *e, two b, double *h) {
+  double once[4 * MINOR], twice[4 * COMPRESSED];
+  size_t count = compress(multiply(n, e, b, once), once);
+  count = compress(multiply(count, once, b, twice), twice);
+  for (size_t i = 0; i < count; i++) h[i] = twice[i];
+  return count;
+}
+
+/* Differences from d, times the power of two that brings the largest to 1. */
+static void incircle_differences(const double *corners[3], const double *d, two delta[3][2]) {
+  double largest = 0;
+  for (int i = 0; i < 3; i++)
+    for (int k = 0; k < 2; k++) {
+      delta[i][k] = difference(corners[i][k], d[k]);
+      largest = fmax(largest, fabs(delta[i][k].high));
+    }
+  int exponent = 0;
+  frexp(largest, &exponent);
+  for (int i = 0; i < 3; i++)
+    for (int k = 0; k < 2; k++) {
+      delta[i][k].high = ldexp(delta[i][k].high, -exponent);
+      delta[i][k].low = ldexp(delta[i][k].low, -exponent);
+    }
+}
+
+static int incircle_exact(const double *a, const double *b, const double *c, const double *d) {
+  const double *corners[3] = {a, b, c};
+  two delta[3][2];
+  incircle_differences(corners, d, delta);
+  double total[3 * COMPRESSED], minor[MINOR], term[2 * COMPRESSED];
+  size_t count = 0;
+  for (int i = 0; i < 3; i++) {
+    two *p = delta[(i + 1) % 3], *q = delta[(i + 2) % 3];
+    size_t n = minor2(p[0], q[1], p[1], q[0], minor);
+    for (int k = 0; k < 2; k++) {
+      size_t pieces = multiply_square(n, minor, delta[i][k], term);
+      count = compress(add(count, total, pieces, term), total);
+    }
+  }
+  return sign_of(count, total);
+}
+
+int batten_incircle(const double *a, const double *b, const double *c, const double *d) {
+  double ax = a[0] - d[0], ay = a[1] - d[1], bx = b[0] - d[0], by = b[1] - d[1], cx = c[0] - d[0], cy = c[1] - d[1];
+  double lift_a = ax * ax + ay * ay, lift_b = bx * bx + by * by, lift_c = cx * cx + cy * cy;
+  double det = lift_a * (bx * cy - by * cx) + lift_b * (cx * ay - cy * ax) + lift_c * (ax * by - ay * bx);
+  double permanent = lift_a * (fabs(bx * cy) + fabs(by * cx)) + lift_b * (fabs(cx * ay) + fabs(cy * ax)) +
+                     lift_c * (fabs(ax * by) + fabs(ay * bx));
+  /* Shewchuk's bound (10 + 96 u) u, a little enlarged; it knows nothing of underflow. */
+  double bound = 6 * DBL_EPSILON * permanent;
+  if (permanent > 1e-200) {
+    if (det > bound) return 1;
+    if (det < -bound) return -1;
+  }
+  return incircle_exact(a, b, c, d);
 }
