@@ -51,9 +51,12 @@ static batten_status tell_points(cli_run *run, const char *path, bool print, cli
   cli_report_count(r, "dimension", cloud.n);
   cli_report_count(r, "points", cloud.count);
   cli_report_bool(r, "normals", cloud.normals != NULL);
+  cli_report_bool(r, "parameters", cloud.parameters != NULL);
+  cli_report_bool(r, "weights", cloud.weights != NULL);
   if (print)
-    cli_line("points", "%zu, %s%s", cloud.count, cloud.n == 2 ? "plane" : "in space",
-             cloud.normals ? ", with normals" : "");
+    cli_line("points", "%zu, %s%s%s%s", cloud.count, cloud.n == 2 ? "plane" : "in space",
+             cloud.normals ? ", with normals" : "", cloud.parameters ? ", with parameters" : "",
+             cloud.weights ? ", with weights" : "");
   tell_box(r, print && cloud.count, cloud.n, lower, upper);
   batten_cloud_free(run->ctx, &cloud);
   return st;

@@ -9,6 +9,8 @@
 
 #include <string.h>
 
+enum { PLY_NUMBERS = PLY_W - PLY_X + 1 }; /* of a vertex that have a meaning */
+
 typedef struct ply {
   bx_reader *r;
   bx_soup *soup;
@@ -114,7 +116,7 @@ static batten_status read_list(ply *p, const ply_property *property, int64_t ind
   return st;
 }
 
-static batten_status read_row(ply *p, const ply_element *e, int64_t index, double x[6]) {
+static batten_status read_row(ply *p, const ply_element *e, int64_t index, double x[PLY_NUMBERS]) {
   size_t field = 0;
   batten_status st = begin_element(p, e);
   for (size_t i = 0; st == BATTEN_OK && i < e->property_count; i++) {
@@ -149,6 +151,24 @@ static const ply_element *find_element(const ply *p, const char *name) {
   return NULL;
 }
 
+static ply_property *find_field(ply *p, const ply_element *e, const char *name) {
+  for (size_t i = 0; i < e->property_count; i++) {
+    ply_property *property = &p->header.properties[e->first_property + i];
+    if (property->role == PLY_FIELD && !strcmp(property->name, name)) return property;
+  }
+  return NULL;
+}
+
+/* Parameters and weights of points are fields of these names; u or v alone means something else. */
+static void find_point_roles(ply *p, const ply_element *vertex) {
+  ply_property *u = find_field(p, vertex, "u"), *v = find_field(p, vertex, "v"), *w = find_field(p, vertex, "w");
+  if (!w) w = find_field(p, vertex, "weight");
+  if (w) w->role = PLY_W;
+  if (!u || !v) return;
+  u->role = PLY_U;
+  v->role = PLY_V;
+}
+
 /* Checks what there must be, and makes room for the fields. */
 static batten_status prepare(ply *p) {
   const ply_element *vertex = find_element(p, "vertex");
@@ -158,6 +178,7 @@ static batten_status prepare(ply *p) {
   p->soup->n = has_role(p, vertex, PLY_Z) ? 3 : 2;
   p->vertices = vertex->count;
   if (vertex->count > UINT32_MAX) return bx_fail_line(p->r, "%lld vertices; too many", (long long)vertex->count);
+  if (!p->soup->want_triangles) find_point_roles(p, vertex);
   batten_status st = BATTEN_OK;
   for (size_t i = 0; st == BATTEN_OK && p->soup->want_triangles && i < vertex->property_count; i++) {
     const ply_property *property = &p->header.properties[vertex->first_property + i];
@@ -170,12 +191,15 @@ static batten_status prepare(ply *p) {
 
 static batten_status read_vertices(ply *p, const ply_element *e) {
   bool normals = has_role(p, e, PLY_NX) && has_role(p, e, PLY_NY) && (p->soup->n == 2 || has_role(p, e, PLY_NZ));
+  bool parameters = has_role(p, e, PLY_U) && has_role(p, e, PLY_V), weights = has_role(p, e, PLY_W);
   batten_status st = BATTEN_OK;
   for (int64_t i = 0; st == BATTEN_OK && i < e->count; i++) {
-    double x[6] = {0};
+    double x[PLY_NUMBERS] = {0};
     st = read_row(p, e, i, x);
     if (st == BATTEN_OK) st = bx_add_vertex(p->soup, x);
-    if (st == BATTEN_OK && normals) st = bx_add_normal(p->soup, x + 3);
+    if (st == BATTEN_OK && normals) st = bx_add_normal(p->soup, x + PLY_NX - PLY_X);
+    if (st == BATTEN_OK && parameters) st = bx_add_parameters(p->soup, x + PLY_U - PLY_X);
+    if (st == BATTEN_OK && weights) st = bx_add_weight(p->soup, x[PLY_W - PLY_X]);
     if (st == BATTEN_OK && p->fields) st = bx_add_field_row(p->soup, p->fields);
   }
   return st;
@@ -184,7 +208,7 @@ static batten_status read_vertices(ply *p, const ply_element *e) {
 static batten_status read_others(ply *p, const ply_element *e) {
   batten_status st = BATTEN_OK;
   for (int64_t i = 0; st == BATTEN_OK && i < e->count && e->property_count; i++) {
-    double unused[6];
+    double unused[PLY_NUMBERS];
     st = read_row(p, e, i, unused);
   }
   return st;

@@ -26,6 +26,9 @@ typedef enum ply_role {
   PLY_NX,
   PLY_NY,
   PLY_NZ,
+  PLY_U, /* these three where points are read; in meshes they are fields */
+  PLY_V,
+  PLY_W,
   PLY_FIELD,  /* another number of a vertex */
   PLY_CORNERS /* the list of a face */
 } ply_role;

@@ -2,14 +2,15 @@
  *
  * The separator is what the first line of a kind (names, numbers) uses: semicolons, else commas, else blanks. Without
  * names the number of columns decides: 2 = x y, 3 = x y z, 4 = x y nx ny, 6 = x y z nx ny nz. Names may also stand in
- * a comment above the first numbers ("# x y z nx ny nz", "//X Y Z R G B"); columns with other names are skipped. */
+ * a comment above the first numbers ("# x y z nx ny nz", "//X Y Z R G B"); columns with other names are skipped.
+ * Parameters (u v) and weights (w) always need names. */
 #include "number.h"
 #include "soup.h"
 
 #include <stdio.h>
 #include <string.h>
 
-enum { X, Y, Z, NX, NY, NZ, ROLES, COLUMNS_MAX = 256 };
+enum { X, Y, Z, NX, NY, NZ, U, V, W, ROLES, COLUMNS_MAX = 256 };
 
 typedef struct table {
   bx_reader *r;
@@ -21,7 +22,7 @@ typedef struct table {
   bool names_in_comment; /* which count only when they fit the numbers */
   size_t named_columns;
   int role[ROLES]; /* column of x, y, ...; -1 = none */
-  bool has_normals;
+  bool has_normals, has_parameters, has_weights;
 } table;
 
 typedef struct field {
@@ -67,23 +68,30 @@ static char lower(char c) { return c >= 'A' && c <= 'Z' ? (char)(c + ('a' - 'A')
 
 static bool is_alphanumeric(char c) { return (c >= '0' && c <= '9') || (lower(c) >= 'a' && lower(c) <= 'z'); }
 
-/* X .. NZ for x, "X", x_m, "y [mm]", Nx, normal_z ...; -1 for other names. */
+/* X .. W for x, "X", x_m, "y [mm]", Nx, normal_z ...; -1 for other names. */
 static int role_of(field f) {
-  static const char *const names[] = {"x",        "y",        "z",        "nx",      "ny",      "nz",
-                                      "normal_x", "normal_y", "normal_z", "normalx", "normaly", "normalz"};
+  static const struct {
+    const char *name;
+    int role;
+  } names[] = {{"x", X},         {"y", Y},        {"z", Z},         {"nx", NX},
+               {"ny", NY},       {"nz", NZ},      {"normal_x", NX}, {"normal_y", NY},
+               {"normal_z", NZ}, {"normalx", NX}, {"normaly", NY},  {"normalz", NZ},
+               {"u", U},         {"v", V},        {"w", W},         {"weight", W}};
   while (f.length && (*f.text == '"' || *f.text == '\'')) f = (field){f.text + 1, f.length - 1};
   for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
-    size_t length = strlen(names[i]), k = 0;
-    while (k < length && k < f.length && lower(f.text[k]) == names[i][k]) k++;
+    const char *name = names[i].name;
+    size_t length = strlen(name), k = 0;
+    while (k < length && k < f.length && lower(f.text[k]) == name[k]) k++;
     bool ends = k == length && (k == f.length || !is_alphanumeric(f.text[k]));
-    if (ends) return i < ROLES ? (int)i : NX + (int)(i - ROLES) % 3;
+    if (ends) return names[i].role;
   }
   return -1;
 }
 
 /* Reads names; false when x and y are not among them. */
 static bool take_names(table *t, const char *line, size_t length) {
-  int role[ROLES] = {-1, -1, -1, -1, -1, -1};
+  int role[ROLES];
+  for (int i = 0; i < ROLES; i++) role[i] = -1;
   char separator = find_separator(line, length);
   size_t at = 0, column = 0;
   field f;
@@ -92,6 +100,7 @@ static bool take_names(table *t, const char *line, size_t length) {
     if (which >= 0 && role[which] < 0) role[which] = (int)column;
   }
   if (role[X] < 0 || role[Y] < 0) return false;
+  if (role[U] < 0 || role[V] < 0) role[U] = role[V] = -1; /* one alone means something else */
   memcpy(t->role, role, sizeof role);
   t->named = true;
   t->named_columns = column;
@@ -115,8 +124,9 @@ static bool is_header(const char *line, size_t length) {
 
 /* Which columns mean what, from their number. */
 static batten_status choose_roles(table *t) {
-  static const int planar[ROLES] = {0, 1, -1, -1, -1, -1}, planar_normals[ROLES] = {0, 1, -1, 2, 3, -1};
-  static const int spatial[ROLES] = {0, 1, 2, -1, -1, -1}, spatial_normals[ROLES] = {0, 1, 2, 3, 4, 5};
+  enum { PLAIN = 6 }; /* roles that columns have without names */
+  static const int planar[PLAIN] = {0, 1, -1, -1, -1, -1}, planar_normals[PLAIN] = {0, 1, -1, 2, 3, -1};
+  static const int spatial[PLAIN] = {0, 1, 2, -1, -1, -1}, spatial_normals[PLAIN] = {0, 1, 2, 3, 4, 5};
   const int *role = t->columns == 2                ? planar
                     : t->columns == 3              ? spatial
                     : t->columns == 4 && t->n != 3 ? planar_normals
@@ -125,9 +135,9 @@ static batten_status choose_roles(table *t) {
   if (!role)
     return bx_fail_line(t->r,
                         "%zu column%s without names; 2, 3, 4 (x y nx ny) or 6 (x y z nx ny nz) are known, for "
-                        "others put a line of names above: x y z nx ny nz",
+                        "others put a line of names above: x y z nx ny nz u v w",
                         t->columns, t->columns == 1 ? "" : "s");
-  memcpy(t->role, role, sizeof t->role);
+  for (int i = 0; i < ROLES; i++) t->role[i] = i < PLAIN ? role[i] : -1;
   return BATTEN_OK;
 }
 
@@ -144,6 +154,8 @@ static batten_status begin_numbers(table *t, const char *line, size_t length) {
   if (st != BATTEN_OK) return st;
   t->soup->n = t->role[Z] < 0 ? 2 : 3;
   t->has_normals = t->role[NX] >= 0 && t->role[NY] >= 0 && (t->soup->n == 2 || t->role[NZ] >= 0);
+  t->has_parameters = t->role[U] >= 0 && t->role[V] >= 0;
+  t->has_weights = t->role[W] >= 0;
   return BATTEN_OK;
 }
 
@@ -185,6 +197,9 @@ static batten_status take_numbers(table *t, const char *line, size_t length) {
   }
   batten_status st = bx_add_vertex(t->soup, x);
   if (st == BATTEN_OK && t->has_normals) st = bx_add_normal(t->soup, normal);
+  if (st == BATTEN_OK && t->has_parameters)
+    st = bx_add_parameters(t->soup, (double[2]){row[t->role[U]], row[t->role[V]]});
+  if (st == BATTEN_OK && t->has_weights) st = bx_add_weight(t->soup, row[t->role[W]]);
   return st;
 }
 

@@ -1,4 +1,4 @@
-/* Points from files: the format's reader fills a soup, of which the points and normals are kept. */
+/* Points from files: the format's reader fills a soup, of which the points and what belongs to them are kept. */
 #include "format.h"
 #include "soup.h"
 
@@ -12,6 +12,8 @@ void batten_cloud_free(batten_context *ctx, batten_cloud *cloud) {
   if (!cloud) return;
   batten_free(ctx, cloud->points);
   batten_free(ctx, cloud->normals);
+  batten_free(ctx, cloud->parameters);
+  batten_free(ctx, cloud->weights);
   *cloud = (batten_cloud){0};
 }
 
@@ -44,12 +46,20 @@ static batten_status check_dimension(bx_reader *r, bx_soup *soup, unsigned n) {
   return n == 2 && soup->n == 3 ? flatten(r, soup) : BATTEN_OK;
 }
 
-/* Whether there is a normal for each point; columns of zeros, which some programs write for want of normals, are none. */
+/* Whether there is a normal for each point; columns of zeros, which some programs write for want of normals, are
+ * none. */
 static bool has_normals(const bx_soup *soup) {
   if (soup->normal_count != soup->vertex_count) return false;
   for (size_t i = 0; i < soup->n * soup->normal_count; i++)
     if (soup->normals[i] != 0) return true;
   return false;
+}
+
+/* The array, which is no longer the soup's; NULL where it is not wanted. */
+static double *take(double **array, bool wanted) {
+  double *out = wanted ? *array : NULL;
+  if (wanted) *array = NULL;
+  return out;
 }
 
 batten_status bx_read_points_from(bx_reader *r, bx_format format, unsigned n, batten_cloud *out) {
@@ -61,11 +71,11 @@ batten_status bx_read_points_from(bx_reader *r, bx_format format, unsigned n, ba
                                         : bx_read_stl(r, &soup);
   if (st == BATTEN_OK) st = check_dimension(r, &soup, n);
   if (st == BATTEN_OK) {
-    bool normals = has_normals(&soup);
-    *out = (batten_cloud){
-        .n = soup.n, .count = soup.vertex_count, .points = soup.vertices, .normals = normals ? soup.normals : NULL};
-    soup.vertices = NULL;
-    if (normals) soup.normals = NULL;
+    *out = (batten_cloud){.n = soup.n, .count = soup.vertex_count};
+    out->points = take(&soup.vertices, true);
+    out->normals = take(&soup.normals, has_normals(&soup));
+    out->parameters = take(&soup.parameters, soup.parameter_count == out->count);
+    out->weights = take(&soup.weights, soup.weight_count == out->count);
   }
   bx_soup_free(&soup);
   return st;

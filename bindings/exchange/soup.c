@@ -8,6 +8,8 @@
 void bx_soup_free(bx_soup *soup) {
   batten_free(soup->ctx, soup->vertices);
   batten_free(soup->ctx, soup->normals);
+  batten_free(soup->ctx, soup->parameters);
+  batten_free(soup->ctx, soup->weights);
   batten_free(soup->ctx, soup->triangles);
   batten_free(soup->ctx, soup->field_names);
   batten_free(soup->ctx, soup->field_values);
@@ -50,6 +52,18 @@ batten_status bx_add_vertex(bx_soup *soup, const double *x) {
 batten_status bx_add_normal(bx_soup *soup, const double *x) {
   batten_status st = append_row(soup->ctx, &soup->normals, &soup->normal_capacity, soup->normal_count, soup->n, x);
   if (st == BATTEN_OK) soup->normal_count++;
+  return st;
+}
+
+batten_status bx_add_parameters(bx_soup *soup, const double *x) {
+  batten_status st = append_row(soup->ctx, &soup->parameters, &soup->parameter_capacity, soup->parameter_count, 2, x);
+  if (st == BATTEN_OK) soup->parameter_count++;
+  return st;
+}
+
+batten_status bx_add_weight(bx_soup *soup, double x) {
+  batten_status st = append_row(soup->ctx, &soup->weights, &soup->weight_capacity, soup->weight_count, 1, &x);
+  if (st == BATTEN_OK) soup->weight_count++;
   return st;
 }
 

@@ -17,6 +17,10 @@ typedef struct bx_soup {
   double *vertices; /* [vertex_count][n] */
   size_t normal_count, normal_capacity;
   double *normals; /* [normal_count][n]; of use when normal_count == vertex_count */
+  size_t parameter_count, parameter_capacity;
+  double *parameters; /* [parameter_count][2]; as the normals */
+  size_t weight_count, weight_capacity;
+  double *weights; /* [weight_count] */
   size_t triangle_count, triangle_capacity;
   uint32_t *triangles; /* [triangle_count][3] */
   /* numbers at the vertices */
@@ -34,8 +38,10 @@ void bx_soup_free(bx_soup *soup);
 /* Makes *array (of *capacity items) hold `need` items, at least doubling it. */
 batten_status bx_grow(batten_context *ctx, void **array, size_t *capacity, size_t need, size_t item_size);
 
-batten_status bx_add_vertex(bx_soup *soup, const double *x); /* [n] */
-batten_status bx_add_normal(bx_soup *soup, const double *x); /* [n] */
+batten_status bx_add_vertex(bx_soup *soup, const double *x);     /* [n] */
+batten_status bx_add_normal(bx_soup *soup, const double *x);     /* [n] */
+batten_status bx_add_parameters(bx_soup *soup, const double *x); /* [2] */
+batten_status bx_add_weight(bx_soup *soup, double x);
 batten_status bx_add_field(bx_soup *soup, const char *name, size_t length);
 batten_status bx_add_field_row(bx_soup *soup, const double *values); /* [field_count] */
 

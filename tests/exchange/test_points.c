@@ -104,7 +104,7 @@ enum { SAMPLES = sizeof samples / sizeof samples[0] };
 
 static bool agrees(const sample *s, const batten_cloud *c) {
   return c->n == s->n && c->count == s->count && !memcmp(c->points, s->points, s->n * s->count * sizeof(double)) &&
-         !c->normals == !s->has_normals &&
+         !c->normals == !s->has_normals && !c->parameters && !c->weights &&
          (!c->normals || !memcmp(c->normals, s->normals, s->n * s->count * sizeof(double)));
 }
 
@@ -124,6 +124,59 @@ static size_t differing(batten_context *ctx) {
 static void test_samples(batten_context *ctx) {
   size_t bad = differing(ctx);
   T_CHECK(bad == 0, "%d small files of points, %zu differ", SAMPLES, bad);
+}
+
+/* Parameters and weights: two points (1, 2, 3), (4, 5, 6) with what each file has. */
+typedef struct parameter_sample {
+  const char *name, *text;
+  bool parameters, weights;
+} parameter_sample;
+
+static const parameter_sample parameter_samples[] = {
+    {"a.csv", "x,y,z,u,v\n1,2,3,0.25,0.5\n4,5,6,1,-1\n", true, false},
+    {"b.txt", "# u v x y z\n.25 .5 1 2 3\n1 -1 4 5 6\n", true, false},
+    {"c.csv", "W;V;U;Z;Y;X;name\n2;.5;.25;3;2;1;a\n0;-1;1;6;5;4;b\n", true, true},
+    {"d.txt", "x y z weight\n1 2 3 2\n4 5 6 0\n", false, true},
+    {"e.csv", "x,y,z,u,uv\n1,2,3,here,1\n4,5,6,there,1\n", false, false}, /* u alone is another thing */
+    {"f.ply",
+     "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty double v\nproperty int "
+     "w\nproperty float z\nproperty double u\nproperty float weight\nend_header\n1 2 .5 2 3 .25 nan\n"
+     "4 5 -1 0 6 1 7\n",
+     true, true},
+    {"g.ply",
+     "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\nproperty float "
+     "weight\nproperty float u\nproperty float s\nproperty float t\nend_header\n1 2 3 2 nan 0 0\n4 5 6 0 1 0 0\n",
+     false, true},
+};
+
+enum { PARAMETER_SAMPLES = sizeof parameter_samples / sizeof parameter_samples[0] };
+
+static void test_parameters(batten_context *ctx) {
+  static const double points[6] = {1, 2, 3, 4, 5, 6}, parameters[4] = {0.25, 0.5, 1, -1}, weights[2] = {2, 0};
+  for (size_t i = 0; i < PARAMETER_SAMPLES; i++) {
+    const parameter_sample *s = &parameter_samples[i];
+    batten_cloud c = {0};
+    T_OK(points_of(ctx, s->name, s->text, strlen(s->text), 0, &c), ctx);
+    bool right = c.count == 2 && c.n == 3 && c.points && !memcmp(c.points, points, sizeof points) && !c.normals &&
+                 !c.parameters == !s->parameters && !c.weights == !s->weights &&
+                 (!c.parameters || !memcmp(c.parameters, parameters, sizeof parameters)) &&
+                 (!c.weights || !memcmp(c.weights, weights, sizeof weights));
+    T_CHECK(right, "%s:%s%s", s->name, s->parameters ? " parameters" : "", s->weights ? " weights" : "");
+    batten_cloud_free(ctx, &c);
+  }
+  batten_cloud c = {0};
+  const char *flat = "x y z u v w\n1 2 0 3 4 5\n";
+  T_OK(points_of(ctx, "a.txt", flat, strlen(flat), 2, &c), ctx);
+  T_CHECK(c.n == 2 && c.points[1] == 2 && c.parameters && c.parameters[1] == 4 && c.weights && c.weights[0] == 5,
+          "in the plane");
+  batten_cloud_free(ctx, &c);
+  T_STATUS(points_of(ctx, "a.csv", "x,y,u,v\n1,2,nan,4\n", 20, 0, &c), BATTEN_E_FORMAT, ctx,
+           "a.csv:2: column 3: 'nan'");
+  const char *ply =
+      "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float u\n"
+      "property float v\nend_header\n1 2 3 inf\n";
+  T_STATUS(points_of(ctx, "a.ply", ply, strlen(ply), 0, &c), BATTEN_E_FORMAT, ctx, "a.ply:9: v: 'inf'");
+  T_CHECK(c.points == NULL, "the result is untouched");
 }
 
 /* The same points as binary PLY in both orders and as binary STL whose header begins with "solid". */
@@ -319,6 +372,7 @@ static void test_shared(batten_context *ctx) {
 int main(void) {
   batten_context *ctx = t_context(NULL, NULL, 1);
   test_samples(ctx);
+  test_parameters(ctx);
   test_binary(ctx);
   test_dimension(ctx);
   test_gzip(ctx);
@@ -329,6 +383,10 @@ int main(void) {
   batten_context_free(ctx);
   for (size_t i = 0; i < SAMPLES; i++)
     t_fail_every_allocation(samples[i].name, read_sample, (void *)(uintptr_t)&samples[i]);
+  for (size_t i = 0; i < PARAMETER_SAMPLES; i++) {
+    sample s = {.name = parameter_samples[i].name, .text = parameter_samples[i].text};
+    t_fail_every_allocation(s.name, read_sample, &s);
+  }
   t_fail_every_allocation("gzip", read_zip, NULL);
   t_cancel_every_progress("gzip", read_zip, NULL);
   t_cancel_every_progress("text", read_sample, (void *)(uintptr_t)&samples[0]);

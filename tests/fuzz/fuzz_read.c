@@ -25,6 +25,11 @@ static const char *check_cloud(const batten_cloud *c) {
     if (!isfinite(c->points[i])) return "a point that is not finite";
     if (c->normals && !isfinite(c->normals[i])) return "a normal that is not finite";
   }
+  for (size_t i = 0; i < c->count; i++) {
+    if (c->weights && !isfinite(c->weights[i])) return "a weight that is not finite";
+    for (size_t k = 0; c->parameters && k < 2; k++)
+      if (!isfinite(c->parameters[2 * i + k])) return "a parameter that is not finite";
+  }
   return NULL;
 }
 

@@ -17,10 +17,12 @@ extern "C" {
 /* ---- points ------------------------------------------------------------------------------------- */
 
 typedef struct batten_cloud {
-  unsigned n;       /* 2 or 3 */
+  unsigned n;         /* 2 or 3 */
   size_t count;
-  double *points;   /* [count][n] */
-  double *normals;  /* [count][n] or NULL; columns of zeros count as none */
+  double *points;     /* [count][n] */
+  double *normals;    /* [count][n] or NULL; columns of zeros count as none */
+  double *parameters; /* [count][2] u v, or NULL */
+  double *weights;    /* [count] or NULL */
 } batten_cloud;
 
 typedef struct batten_read_points_options {
@@ -32,8 +34,10 @@ BATTEN_API batten_read_points_options batten_read_points_options_default(void);
 /* By extension, each also with .gz:
  *   .xyz .txt .csv .tsv .asc .dat   text: separated by semicolons, else commas, else blanks; # % // comments. Without
  *             names 2 columns are x y, 3 x y z, 4 x y nx ny, 6 x y z nx ny nz; others need a line of names above the
- *             numbers (also as a comment), from which x, y, z, nx, ny, nz are taken in any order.
- *   .ply      ASCII and both binary orders; nx ny nz are the normals; the vertices are planar without z
+ *             numbers (also as a comment), from which x, y, z, nx, ny, nz, the parameters u, v and the weight w (or
+ *             "weight") are taken in any order.
+ *   .ply      ASCII and both binary orders; nx ny nz are the normals, u v the parameters, w or weight the weights; the
+ *             vertices are planar without z
  *   .obj      v and vn: normals where every vertex has one      .off  also NOFF, COFF, STOFF
  *   .stl      ASCII and binary; the corners, equal ones once
  * Numbers must be finite. Free with batten_cloud_free. Fails: IO, FORMAT, INVALID (unknown extension: lists the
