@@ -103,9 +103,19 @@ static double put_text(const axes_work *w, const double from[2], const double di
   return gap + 2 * half;
 }
 
+/* Numbers of an edge that goes up stand beside it rather than across it: where two edges meet theirs keep apart. */
+static void text_direction(const axes_edge *e, double out[2]) {
+  double x = e->outward[0] + (fabs(e->outward[0]) > 0.5 ? copysign(0.7, e->outward[0]) : 0), y = e->outward[1];
+  double length = hypot(x, y);
+  out[0] = x / length;
+  out[1] = y / length;
+}
+
 static void draw_scale(const axes_work *w, unsigned k, const axes_edge *e) {
   double unit = w->view->unit, height = 0.85 * unit, reach = 0;
   if (e->length < 2 * unit) return; /* seen along itself */
+  double direction[2];
+  text_direction(e, direction);
   const char *label = w->view->o.axes->labels[coordinate(w, k)];
   for (size_t i = 0; i < w->ticks[k].count; i++) {
     char text[PICTURE_TICK_SIZE];
@@ -116,14 +126,14 @@ static void draw_scale(const axes_work *w, unsigned k, const axes_edge *e) {
     picture_tick_text(&w->ticks[k], i, text);
     picture_mask_capsule(w->image, at[0], at[1], at[0] + 0.4 * unit * e->outward[0],
                          at[1] + 0.4 * unit * e->outward[1], 0.05 * unit);
-    reach = fmax(reach, put_text(w, at, e->outward, 0.8 * unit, height, text));
+    reach = fmax(reach, put_text(w, at, direction, 0.8 * unit, height, text));
   }
   if (label) {
     float middle[3];
     double at[2];
     for (unsigned j = 0; j < 3; j++) middle[j] = 0.5f * (e->ends[0][j] + e->ends[1][j]);
     to_pixel(w, middle, at);
-    put_text(w, at, e->outward, reach + 0.5 * unit, 1.05 * unit, label);
+    put_text(w, at, direction, reach + 0.5 * unit, 1.05 * unit, label);
   }
 }
 
