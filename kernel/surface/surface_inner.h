@@ -2,9 +2,9 @@
  *
  * surface.c    create, free, parts         evaluate.c   points, normals, curvatures
  * patches.c    span pairs as Bezier nets   tessellate.c meshes
- * closest.c    nearest places
- * measure.c    area, extremes of K         certify*.c   the proof of convexity: includes nothing of kernel/convex and
- *                                          not the blossoms of basis/bspline.c, with which its inequalities are made
+ * closest.c    nearest places              measure.c    area, quantiles, tangent planes; extremes.c, box.c
+ * certify*.c   the proof of convexity: includes nothing of kernel/convex and not the blossoms of basis/bspline.c,
+ * with which its inequalities are made
  */
 #ifndef BATTEN_SURFACE_INNER_H
 #define BATTEN_SURFACE_INNER_H
@@ -44,6 +44,12 @@ void surface_jet_scaled(const batten_surface *surface, const surface_basis *u, c
 void surface_point_make(const batten_surface *surface, const surface_basis *u, const surface_basis *v,
                         batten_surface_point *out);
 
+/* The parameter at a part (0 .. 1) of span mu: within it, its ends exactly. */
+static inline double surface_span_at(const bspline *space, size_t mu, double part) {
+  double from = space->knots[mu], to = space->knots[mu + 1], t = (1 - part) * from + part * to;
+  return t < from ? from : t > to ? to : t;
+}
+
 /* ---- patches.c ----------------------------------------------------------------------------------- */
 
 /* The spans of one direction. */
@@ -61,5 +67,22 @@ void surface_axis_free(batten_context *ctx, surface_axis *axis);
 /* The Bezier net [degree 0 + 1][degree 1 + 1][3] of span pair (i, j), 2^exponent (b - origin). */
 void surface_patch_net(const batten_surface *surface, const surface_axis axis[2], size_t i, size_t j,
                        const double origin[3], int exponent, double (*net)[3]);
+
+/* ---- extremes.c, box.c: for measure.c ------------------------------------------------------------ */
+
+/* What extremes are looked for; the last is the least |du x dv| by parameters in which the domain is 1 x 1, in the
+ * scaled unit. */
+enum { SURFACE_GAUSS_MIN, SURFACE_GAUSS_MAX, SURFACE_MEAN_MIN, SURFACE_MEAN_MAX, SURFACE_AREA_MIN, SURFACE_EXTREMES };
+typedef struct surface_extreme {
+  double value, at[2]; /* of the scaled surface; NaN where there is no normal anywhere */
+} surface_extreme;
+/* Progress phase "measure", `from` to `to`. Fails: NOMEM, CANCELLED. */
+batten_status surface_find_extremes(batten_context *ctx, const batten_surface *surface, const surface_axis axis[2],
+                                    double from, double to, surface_extreme out[SURFACE_EXTREMES]);
+
+/* A box that holds the surface, larger than the least one by 1e-9 of its size at most, where that can be had. Fails:
+ * NOMEM. */
+batten_status surface_find_box(batten_context *ctx, const batten_surface *surface, const surface_axis axis[2],
+                               double lower[3], double upper[3]);
 
 #endif

@@ -104,8 +104,7 @@ static void make_lines(grid *g, int k) {
     unsigned n = g->segments[k][i];
     bool last = i + 1 == g->axis[k].count;
     for (unsigned step = 0; step < n + last; step++, at++) {
-      double part = (double)step / n;
-      g->t[k][at] = step == n ? space->knots[mu + 1] : (1 - part) * space->knots[mu] + part * space->knots[mu + 1];
+      g->t[k][at] = surface_span_at(space, mu, (double)step / n);
       surface_basis_make(space, mu, g->t[k][at], &g->basis[k][at]);
     }
   }
