@@ -6,8 +6,8 @@
  * function_least.c  the least eigenvalue of a spline's Hessian, by bounds
  * function_rounds.c the rounds between the upper and the lower bound
  *
- * In all of it the domain is [0, 1]^2, z is scaled to about 1 with its best plane taken off, and the sign of the first
- * constrained span pair is +1. A Hessian is three numbers f_xx, f_xy, f_yy. */
+ * In all of it the domain is [0, 1]^2, z is scaled to about 1 with its best plane taken off, and the sign of the
+ * first constrained span pair is +1. A Hessian is three numbers f_xx, f_xy, f_yy. */
 #ifndef BATTEN_CONVEX_FUNCTION_INNER_H
 #define BATTEN_CONVEX_FUNCTION_INNER_H
 
@@ -99,8 +99,8 @@ batten_status function_least(batten_context *ctx, const function_space *space, c
 typedef struct function_rounds_options {
   unsigned rounds;
   double gap_tol;
-  double floor; /* objectives below it are nothing */
-  double noise; /* of second derivatives, by rounding of coefficients */
+  double floor;   /* objectives below it are nothing */
+  double noise;   /* of second derivatives, by rounding of coefficients */
   bool rows_only; /* the result comes from the sufficient inequalities alone: for tests */
 } function_rounds_options;
 

@@ -4,12 +4,12 @@
  * added there; every minimum on the way is a bound. It converges to the best convex spline, from outside.
  * From above, in each round, two splines that are convex:
  *   - the minimum with the sufficient inequalities. Their directions are those of the last such minimum, which stays
- *     feasible, so that objectives never rise; boxes with active inequalities are quartered, and coefficients that are
- *     nearly singular get more directions. In the limit nothing convex is excluded.
- *   - where all signs are equal: the solution from below, with as much of (x^2 + y^2) / 2 added as its least eigenvalue
- *     asks for. That eigenvalue is bounded by subdivision, so this is a proof, too.
- * Equal signs: the Hessian less `margin` times the identity is to be semidefinite, so that convexity is strict. Where
- * opposite signs touch the Hessian vanishes, and nothing strict can be had. */
+ *     feasible, so that objectives never rise; boxes with active inequalities are quartered, and coefficients that
+ * are nearly singular get more directions. In the limit nothing convex is excluded.
+ *   - where all signs are equal: the solution from below, with as much of (x^2 + y^2) / 2 added as its least
+ * eigenvalue asks for. That eigenvalue is bounded by subdivision, so this is a proof, too. Equal signs: the Hessian
+ * less `margin` times the identity is to be semidefinite, so that convexity is strict. Where opposite signs touch the
+ * Hessian vanishes, and nothing strict can be had. */
 #include <string.h>
 
 #include "base/checked.h"
@@ -145,7 +145,6 @@ static batten_status grow_active(rounds_state *s, size_t rows_before) {
 
 static batten_status from_below(rounds_state *s, unsigned round) {
   size_t n = s->space->n;
-  /* Cuts to a hundredth of the curvature at first, and to less in each round. */
   double tolerance = s->scale * pow(0.1, 3 + round);
   for (unsigned step = 0; step < CUT_STEPS; step++) {
     double worst, bound, begin = batten_now();
@@ -233,7 +232,8 @@ static batten_status refine_boxes(rounds_state *s) {
   size_t last = SIZE_MAX, count = s->box_count, per_box = s->rows.rows / (count ? count : 1) + 1;
   for (size_t r = 0; r < s->rows.rows; r++) {
     size_t b = s->row_box[r];
-    if (!s->row_active[r] || b == last || s->boxes[b].depth == BOX_DEPTH || s->box_count * per_box > ROW_LIMIT) continue;
+    if (!s->row_active[r] || b == last || s->boxes[b].depth == BOX_DEPTH || s->box_count * per_box > ROW_LIMIT)
+      continue;
     last = b;
     function_box whole = s->boxes[b];
     double middle[2];
@@ -286,8 +286,8 @@ static batten_status bound_squares(rounds_state *s) {
   bool solved;
   s->info->squares_lower = s->lower;
   if (s->terms->tension.rows == 0) return BATTEN_OK;
-  batten_status st = minimise(s, &s->cuts, false, s->outer, s->cuts.rows ? s->cut_active : NULL, s->work, NULL, &bound,
-                              &solved);
+  batten_status st =
+      minimise(s, &s->cuts, false, s->outer, s->cuts.rows ? s->cut_active : NULL, s->work, NULL, &bound, &solved);
   s->info->squares_lower = fmax(bound, 0);
   return st;
 }
@@ -312,11 +312,16 @@ static batten_status start(rounds_state *s, double *unconstrained) {
   size_t n = s->space->n;
   batten_status st = minimise(s, NULL, true, NULL, NULL, s->outer, NULL, &s->lower, &solved);
   if (st < 0) return st;
-  if (!solved) return batten_fail(s->ctx, BATTEN_E_SINGULAR, "points: they do not determine the spline; raise tension");
+  if (!solved)
+    return batten_fail(s->ctx, BATTEN_E_SINGULAR, "points: they do not determine the spline; raise tension");
   s->lower = fmax(s->lower, 0);
   memcpy(unconstrained, s->outer, n * sizeof *unconstrained);
   s->scale = fmax(curvature_scale(s->space, s->outer), s->opt->noise);
-  s->margin = fmax(1e-6 * s->scale, s->opt->noise);
+  /* A margin adds its bowl, at most margin / 8 or so, to a spline that is off by the root of lower: little enough
+   * that it takes a twentieth of what the gap may be. */
+  double gap = s->opt->gap_tol * s->lower + s->opt->floor, off = sqrt(s->lower);
+  double margin = fmin(1e-6 * s->scale, fmin(0.08 * gap / fmax(off, 1e-300), sqrt(0.5 * gap)));
+  s->margin = fmax(margin, s->opt->noise);
   for (size_t k = 0; k < n; k++) s->work[k] = s->space->opposite ? 0 : s->margin * s->bowl[k];
   s->objective = INFINITY;
   st = consider(s, s->work);

@@ -1,8 +1,8 @@
 /* Linear inequalities that make a spline function convex.   [Juettler: Surface fitting using convex tensor-product
  * splines, 1997]
  *
- * On a box the Hessian H(x, y) has Bernstein coefficients H_rs, symmetric matrices that are linear in the spline's own
- * coefficients, once f_xx, f_xy, f_yy are raised to the same degrees. All H_rs semidefinite: H is. A matrix is
+ * On a box the Hessian H(x, y) has Bernstein coefficients H_rs, symmetric matrices that are linear in the spline's
+ * own coefficients, once f_xx, f_xy, f_yy are raised to the same degrees. All H_rs semidefinite: H is. A matrix is
  * semidefinite if
  *     z_a' H z_(a + 1) >= 0,  a = 0 .. P - 1,   z_P = -z_0,
  * for P >= 3 directions in the order of their angles, neighbours less than half a turn apart: these are the facets of
@@ -31,8 +31,8 @@ void function_axis_rows(const bspline *b, size_t mu, double lower, double upper,
       for (unsigned r = degree + 1; r + 1 > 0; r--) { /* in place: from the last to the first */
         double part = (double)r / (degree + 1);
         for (unsigned j = 0; j < order; j++)
-          table[r * order + j] = (r ? part * table[(r - 1) * order + j] : 0) +
-                                 (r <= degree ? (1 - part) * table[r * order + j] : 0);
+          table[r * order + j] =
+              (r ? part * table[(r - 1) * order + j] : 0) + (r <= degree ? (1 - part) * table[r * order + j] : 0);
         if (r == 0) break;
       }
   }
@@ -126,8 +126,8 @@ void function_eigen(const double h[3], double values[2], double *angle) {
 
 enum { DIRECTIONS_MAX = 16 };
 
-/* Adds an angle, in [0, half a turn), unless it is there already: to 1e-3, below which rows are parallel to the digits
- * that they are solved to. */
+/* Adds an angle, in [0, half a turn), unless it is there already: to 1e-3, below which rows are parallel to the
+ * digits that they are solved to. */
 static void add_angle(double angle, unsigned *count, double *angles) {
   angle -= half_turn * floor(angle / half_turn);
   for (unsigned i = 0; i < *count; i++) {
@@ -141,8 +141,8 @@ static void add_angle(double angle, unsigned *count, double *angles) {
 }
 
 /* Directions for a coefficient that is h of the reference. */
-static unsigned choose_directions(const function_directions *opt, const double h[3], const double *other, double scale,
-                                  double *angles) {
+static unsigned choose_directions(const function_directions *opt, const double h[3], const double *other,
+                                  double scale, double *angles) {
   double values[2], angle, ratio;
   unsigned count = 0;
   function_eigen(h, values, &angle);
@@ -233,8 +233,8 @@ static void append_cut(const function_space *space, const uint32_t span[2], cons
   for (size_t i = 0; i < n0; i++)
     for (size_t j = 0; j < n1; j++) {
       const double *u = t.basis[0] + i, *v = t.basis[1] + j;
-      double value = sign * (z[0] * z[0] * u[2 * n0] * v[0] + 2 * z[0] * z[1] * u[n0] * v[n1] +
-                             z[1] * z[1] * u[0] * v[2 * n1]);
+      double value =
+          sign * (z[0] * z[0] * u[2 * n0] * v[0] + 2 * z[0] * z[1] * u[n0] * v[n1] + z[1] * z[1] * u[0] * v[2 * n1]);
       if (value == 0) continue;
       cuts->indices[at] = (uint32_t)((t.first[0] + i) * stride + t.first[1] + j);
       cuts->values[at++] = value;

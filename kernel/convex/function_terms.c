@@ -101,8 +101,8 @@ static batten_status make_tension(batten_context *ctx, const function_space *spa
           if (j + b < v->degree || j + b - v->degree >= v->count) continue;
           size_t x = i * width[0] + a, y = j * width[1] + b;
           out->indices[at] = (uint32_t)((i + a - u->degree) * v->count + j + b - v->degree);
-          out->values[at++] = weight * (of[0][2][x] * of[1][0][y] + 2 * of[0][1][x] * of[1][1][y] +
-                                        of[0][0][x] * of[1][2][y]);
+          out->values[at++] =
+              weight * (of[0][2][x] * of[1][0][y] + 2 * of[0][1][x] * of[1][1][y] + of[0][0][x] * of[1][2][y]);
         }
       out->starts[++out->rows] = at;
     }
