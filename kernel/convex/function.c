@@ -1,0 +1,470 @@
+/* Convex spline functions of scattered data: checks, scales, the result.   [Juettler: Surface fitting using convex
+ * tensor-product splines, 1997]
+ *
+ * The points are taken to [0, 1]^2, their best plane is taken off z, which changes no second derivative, and what is
+ * left is scaled to about 1 by a power of two. Concave functions are the negatives of convex ones, to the bit. */
+#include <float.h>
+#include <string.h>
+
+#include "base/checked.h"
+#include "basis/shape.h"
+#include "function_inner.h"
+#include "surface/surface_inner.h"
+
+enum { SPANS_MAX = 64 };
+
+batten_convex_function_options batten_convex_function_options_default(void) {
+  return (batten_convex_function_options){.struct_size = sizeof(batten_convex_function_options),
+                                          .degree = {3, 3},
+                                          .spans = {4, 4},
+                                          .domain = {{NAN, NAN}, {NAN, NAN}},
+                                          .tension = 1e-8,
+                                          .gap_tol = 1e-3,
+                                          .rounds = 6};
+}
+
+typedef struct function_fit {
+  batten_context *ctx;
+  size_t count;
+  const double *points;
+  batten_convex_function_options opt;
+  double domain[2][2];
+  function_space space; /* of [0, 1]^2 */
+  bspline caller[2];    /* the same knots over the caller's domain */
+  double *knots[2], *knots_caller[2], *greville[2];
+  signed char *signs;         /* of the space: first constrained one +1 */
+  double sign;                /* what they were multiplied with */
+  double *scaled, *weights;   /* [count][3], [count] of sum 1 */
+  double plane[3];            /* of z sign scale: plane[0] + plane[1] x + plane[2] y, x and y scaled */
+  double scale, total_weight; /* of z: power of two */
+  double noise;               /* largest |z| before the plane was taken off, scaled */
+  double *x, *unconstrained;  /* [n] */
+  double *points_of;          /* [n][3] control points */
+} function_fit;
+
+/* ---- checks -------------------------------------------------------------------------------------- */
+
+static batten_status check_breaks(batten_context *ctx, const batten_convex_function_options *o, int i,
+                                  const double domain[2]) {
+  size_t count = o->break_count[i];
+  if (count >= SPANS_MAX)
+    return batten_fail(ctx, BATTEN_E_INVALID, "break_count[%d]: %zu; give at most %d", i, count, SPANS_MAX - 1);
+  if (!o->breaks[i])
+    return batten_fail(ctx, BATTEN_E_INVALID, "breaks[%d]: NULL; give [%zu] ascending numbers", i, count);
+  for (size_t k = 0; k < count; k++) {
+    double at = o->breaks[i][k], before = k ? o->breaks[i][k - 1] : domain[0];
+    if (!(at > domain[0] && at < domain[1]))
+      return batten_fail(ctx, BATTEN_E_INVALID, "breaks[%d][%zu]: %.17g; give one inside the domain %.17g .. %.17g",
+                         i, k, at, domain[0], domain[1]);
+    /* 1e-6: second derivatives have the square of it as a unit */
+    if (!(at - before > 1e-6 * (domain[1] - domain[0])) ||
+        (k + 1 == count && !(domain[1] - at > 1e-6 * (domain[1] - domain[0]))))
+      return batten_fail(ctx, BATTEN_E_INVALID,
+                         "breaks[%d][%zu]: %.17g; breaks must ascend, by a millionth of the domain at least", i, k,
+                         at);
+  }
+  return BATTEN_OK;
+}
+
+static batten_status check_options(batten_context *ctx, const batten_convex_function_options *o) {
+  batten_status st = batten_check_struct(ctx, "batten_convex_function_options", o->struct_size,
+                                         sizeof(batten_convex_function_options));
+  if (st < 0) return st;
+  for (int i = 0; i < 2; i++) {
+    if (o->degree[i] < 2 || o->degree[i] > 7)
+      return batten_fail(ctx, BATTEN_E_INVALID, "degree[%d]: %u; give 2 to 7", i, o->degree[i]);
+    if (o->break_count[i] == 0 && (o->spans[i] < 1 || o->spans[i] > SPANS_MAX))
+      return batten_fail(ctx, BATTEN_E_INVALID, "spans[%d]: %u; give 1 to %d", i, o->spans[i], SPANS_MAX);
+    if (o->smoothness[i] >= o->degree[i])
+      return batten_fail(ctx, BATTEN_E_INVALID, "smoothness[%d]: %u; degree %u allows 1 to %u, 0 = the most", i,
+                         o->smoothness[i], o->degree[i], o->degree[i] - 1);
+  }
+  if (!(o->tension >= 0) || !isfinite(o->tension))
+    return batten_fail(ctx, BATTEN_E_INVALID, "tension: %g; give a number >= 0", o->tension);
+  if (!(o->gap_tol > 0) || !isfinite(o->gap_tol))
+    return batten_fail(ctx, BATTEN_E_INVALID, "gap_tol: %g; give a number > 0", o->gap_tol);
+  if (o->rounds < 1 || o->rounds > FUNCTION_ROUNDS_MAX)
+    return batten_fail(ctx, BATTEN_E_INVALID, "rounds: %u; give 1 to %d", o->rounds, FUNCTION_ROUNDS_MAX);
+  return BATTEN_OK;
+}
+
+static batten_status check_weights(function_fit *f) {
+  const double *weights = f->opt.weights;
+  double largest = 0;
+  for (size_t k = 0; weights && k < f->count; k++) {
+    if (!(weights[k] >= 0) || !isfinite(weights[k]))
+      return batten_fail(f->ctx, BATTEN_E_INVALID, "weights[%zu]: %g; give numbers >= 0", k, weights[k]);
+    largest = fmax(largest, weights[k]);
+  }
+  if (weights && largest == 0)
+    return batten_fail(f->ctx, BATTEN_E_INVALID, "weights: all are 0; give one above 0 at least");
+  return BATTEN_OK;
+}
+
+/* The domain that is given, or the points' box; points outside are named. */
+static batten_status find_domain(function_fit *f) {
+  bool given = false;
+  for (int k = 0; k < 4; k++) given = given || !isnan(f->opt.domain[k / 2][k % 2]);
+  memcpy(f->domain, f->opt.domain, sizeof f->domain);
+  for (int i = 0; i < 2; i++) {
+    double *d = f->domain[i];
+    for (size_t k = 0; k < f->count && !given; k++) {
+      double at = f->points[3 * k + (size_t)i];
+      d[0] = k ? fmin(d[0], at) : at;
+      d[1] = k ? fmax(d[1], at) : at;
+    }
+    if (!given && !(d[0] < d[1]))
+      return batten_fail(
+          f->ctx, BATTEN_E_SINGULAR,
+          "points: all have %c = %.17g, so that they do not determine a function; give points that are "
+          "not on a line",
+          i ? 'y' : 'x', d[0]);
+    if (!(d[0] < d[1]) || !isfinite(d[1] - d[0]) || !isnormal(d[1] - d[0]))
+      return batten_fail(f->ctx, BATTEN_E_INVALID,
+                         "domain[%d]: %g to %g; give two ascending numbers, or NaN four times", i, d[0], d[1]);
+    for (size_t k = 0; k < f->count; k++) {
+      double at = f->points[3 * k + (size_t)i];
+      if (at < d[0] || at > d[1])
+        return batten_fail(f->ctx, BATTEN_E_INVALID,
+                           "points[%zu]: %c = %.17g is outside the domain %.17g .. %.17g; remove it, or widen the "
+                           "domain",
+                           k, i ? 'y' : 'x', at, d[0], d[1]);
+    }
+  }
+  return BATTEN_OK;
+}
+
+static batten_status check(function_fit *f) {
+  size_t numbers;
+  batten_status st = check_options(f->ctx, &f->opt);
+  if (st < 0) return st;
+  if (f->count == 0) return batten_fail(f->ctx, BATTEN_E_INVALID, "count: 0; give points");
+  if (!f->points) return batten_fail(f->ctx, BATTEN_E_INVALID, "points: NULL; give [count][3] numbers");
+  if (f->count > UINT32_MAX || !batten_mul(f->count, 3 * sizeof(double), &numbers))
+    return batten_fail(f->ctx, BATTEN_E_TOO_LARGE, "count: %zu; give fewer points", f->count);
+  size_t bad = batten_first_nonfinite(3 * f->count, f->points);
+  if (bad < 3 * f->count)
+    return batten_fail(f->ctx, BATTEN_E_INVALID, "points[%zu][%zu]: %g; give finite points", bad / 3, bad % 3,
+                       f->points[bad]);
+  st = check_weights(f);
+  if (st == BATTEN_OK) st = find_domain(f);
+  for (int i = 0; i < 2 && st == BATTEN_OK; i++) {
+    if (f->opt.break_count[i] > 0) st = check_breaks(f->ctx, &f->opt, i, f->domain[i]);
+    f->space.spans[i] = f->opt.break_count[i] > 0 ? f->opt.break_count[i] + 1 : f->opt.spans[i];
+    f->space.smoothness[i] = f->opt.smoothness[i] ? f->opt.smoothness[i] : f->opt.degree[i] - 1;
+  }
+  for (size_t k = 0; st == BATTEN_OK && f->opt.signs && k < f->space.spans[0] * f->space.spans[1]; k++)
+    if (f->opt.signs[k] < -1 || f->opt.signs[k] > 1)
+      st = batten_fail(f->ctx, BATTEN_E_INVALID, "signs[%zu][%zu]: %d; give -1, 0 or 1", k / f->space.spans[1],
+                       k % f->space.spans[1], f->opt.signs[k]);
+  return st;
+}
+
+/* ---- scales -------------------------------------------------------------------------------------- */
+
+static double to_unit(const double domain[2], double t) {
+  return fmin(fmax((t - domain[0]) / (domain[1] - domain[0]), 0), 1);
+}
+
+static batten_status make_space(function_fit *f) {
+  function_space *s = &f->space;
+  for (int i = 0; i < 2; i++) {
+    unsigned d = f->opt.degree[i];
+    const double *breaks = f->opt.break_count[i] ? f->opt.breaks[i] : NULL;
+    size_t knots = bspline_make_knots(d, s->smoothness[i], s->spans[i], NULL, 0, 1, NULL), count = knots - d - 1;
+    double unit[SPANS_MAX];
+    for (size_t k = 0; breaks && k + 1 < s->spans[i]; k++) unit[k] = to_unit(f->domain[i], breaks[k]);
+    f->knots[i] = batten_alloc_array(f->ctx, 2 * knots + count, sizeof(double));
+    s->span[i] = batten_alloc_array(f->ctx, s->spans[i], sizeof *s->span[i]);
+    if (!f->knots[i] || !s->span[i]) return BATTEN_E_NOMEM;
+    f->knots_caller[i] = f->knots[i] + knots;
+    f->greville[i] = f->knots_caller[i] + knots;
+    bspline_make_knots(d, s->smoothness[i], s->spans[i], breaks ? unit : NULL, 0, 1, f->knots[i]);
+    bspline_make_knots(d, s->smoothness[i], s->spans[i], breaks, f->domain[i][0], f->domain[i][1],
+                       f->knots_caller[i]);
+    s->spline.axis[i] = (bspline){d, count, f->knots[i]};
+    f->caller[i] = (bspline){d, count, f->knots_caller[i]};
+    size_t span = 0;
+    for (size_t mu = bspline_first(&s->spline.axis[i]); mu < count; mu = bspline_next(&s->spline.axis[i], mu))
+      s->span[i][span++] = mu;
+  }
+  s->n = convex_points(&s->spline);
+  return BATTEN_OK;
+}
+
+/* Signs, turned such that the first is +1; whether opposite ones touch, also at a corner. */
+static batten_status make_signs(function_fit *f) {
+  size_t rows = f->space.spans[0], columns = f->space.spans[1];
+  f->signs = batten_alloc(f->ctx, rows * columns);
+  if (!f->signs) return BATTEN_E_NOMEM;
+  f->sign = 0;
+  for (size_t k = 0; k < rows * columns; k++) {
+    f->signs[k] = f->opt.signs ? f->opt.signs[k] : 1;
+    if (f->sign == 0) f->sign = f->signs[k];
+  }
+  if (f->sign == 0) f->sign = 1;
+  for (size_t k = 0; k < rows * columns; k++) f->signs[k] = (signed char)(f->signs[k] * (int)f->sign);
+  f->space.signs = f->signs;
+  for (size_t i = 0; i < rows; i++)
+    for (size_t j = 0; j < columns; j++)
+      for (size_t k = i; k < rows && k <= i + 1; k++)
+        for (size_t l = j ? j - 1 : 0; l < columns && l <= j + 1; l++)
+          if (f->signs[i * columns + j] * f->signs[k * columns + l] < 0) f->space.opposite = true;
+  return BATTEN_OK;
+}
+
+/* The best plane of z over the scaled places, by weighted moments; SINGULAR when the places are on a line. */
+static batten_status best_plane(function_fit *f) {
+  double mean[3] = {0}, m[5] = {0}; /* xx, xy, yy, xz, yz */
+  for (size_t k = 0; k < f->count; k++)
+    for (int i = 0; i < 3; i++) mean[i] += f->weights[k] * f->scaled[3 * k + (size_t)i];
+  for (size_t k = 0; k < f->count; k++) {
+    const double *p = f->scaled + 3 * k;
+    double x = p[0] - mean[0], y = p[1] - mean[1], z = p[2] - mean[2], w = f->weights[k];
+    double add[5] = {x * x, x * y, y * y, x * z, y * z};
+    for (int i = 0; i < 5; i++) m[i] += w * add[i];
+  }
+  double values[2], angle;
+  function_eigen(m, values, &angle);
+  /* 1e-18: a width of 1e-9 of the length; less is the rounding of points that were on a line */
+  if (!(values[1] > 1e-18 * values[0]))
+    return batten_fail(f->ctx, BATTEN_E_SINGULAR,
+                       "points: all that count are on a line, so that they do not determine a function; give points "
+                       "beside it");
+  double det = values[0] * values[1];
+  f->plane[1] = (m[2] * m[3] - m[1] * m[4]) / det;
+  f->plane[2] = (m[0] * m[4] - m[1] * m[3]) / det;
+  f->plane[0] = mean[2] - f->plane[1] * mean[0] - f->plane[2] * mean[1];
+  return BATTEN_OK;
+}
+
+static batten_status scale_points(function_fit *f) {
+  size_t count = f->count;
+  f->scaled = batten_alloc_array(f->ctx, 4 * count, sizeof *f->scaled);
+  if (!f->scaled) return BATTEN_E_NOMEM;
+  f->weights = f->scaled + 3 * count;
+  double largest = 0, heaviest = 1, total = 0;
+  for (size_t k = 0; k < count; k++) largest = fmax(largest, fabs(f->points[3 * k + 2]));
+  for (size_t k = 0; k < count && f->opt.weights; k++)
+    heaviest = k ? fmax(heaviest, f->opt.weights[k]) : f->opt.weights[0];
+  for (size_t k = 0; k < count; k++) total += f->weights[k] = f->opt.weights ? f->opt.weights[k] / heaviest : 1;
+  for (size_t k = 0; k < count; k++) f->weights[k] /= total;
+  f->total_weight = total * heaviest;
+  f->scale = largest > 0 ? batten_unit(largest) : 1;
+  for (size_t k = 0; k < count; k++) {
+    for (int i = 0; i < 2; i++) f->scaled[3 * k + (size_t)i] = to_unit(f->domain[i], f->points[3 * k + (size_t)i]);
+    f->scaled[3 * k + 2] = f->sign * f->scale * f->points[3 * k + 2];
+  }
+  batten_status st = best_plane(f);
+  if (st < 0) return st;
+  double left = 0;
+  for (size_t k = 0; k < count; k++) {
+    double *p = f->scaled + 3 * k;
+    p[2] -= f->plane[0] + f->plane[1] * p[0] + f->plane[2] * p[1];
+    left = fmax(left, fabs(p[2]));
+  }
+  double size = fmax(1, fabs(f->plane[0]) + fabs(f->plane[1]) + fabs(f->plane[2]));
+  bool flat = left <= 64 * DBL_EPSILON * size; /* rounding of the plane itself */
+  double unit = flat ? 1 : batten_unit(left);
+  for (size_t k = 0; k < count; k++) f->scaled[3 * k + 2] *= flat ? 0 : unit;
+  for (int i = 0; i < 3; i++) f->plane[i] *= unit;
+  f->scale *= unit;
+  f->noise = size * unit;
+  return BATTEN_OK;
+}
+
+/* ---- the result ---------------------------------------------------------------------------------- */
+
+static double value_at(const function_fit *f, const double *point) {
+  const bspline *u = &f->caller[0], *v = &f->caller[1];
+  size_t mu[2] = {bspline_span(u, point[0]), bspline_span(v, point[1])};
+  double table[2][BSPLINE_ORDER], sum = 0;
+  bspline_basis(u, mu[0], point[0], 0, table[0]);
+  bspline_basis(v, mu[1], point[1], 0, table[1]);
+  for (unsigned i = 0; i <= u->degree; i++)
+    for (unsigned j = 0; j <= v->degree; j++)
+      sum += table[0][i] * table[1][j] *
+             f->points_of[((mu[0] - u->degree + i) * v->count + mu[1] - v->degree + j) * 3 + 2];
+  return sum;
+}
+
+/* The surface of scaled coefficients; the weighted sum of squares of its distances in z, their largest. */
+static batten_status make_surface(function_fit *f, const double *x, batten_surface **out, double *lsq,
+                                  double *max_error, size_t *max_index) {
+  batten_surface_form form = {.control_points = f->points_of};
+  size_t stride = f->caller[1].count;
+  double *greville[2] = {f->greville[0], f->greville[1]};
+  for (int i = 0; i < 2; i++) {
+    bspline_greville(&f->caller[i], greville[i]);
+    form.degree[i] = f->opt.degree[i];
+    form.knot_count[i] = f->caller[i].count + f->opt.degree[i] + 1;
+    form.knots[i] = f->caller[i].knots;
+  }
+  for (size_t k = 0; k < f->space.n; k++) {
+    size_t at[2] = {k / stride, k % stride};
+    double place[2], z = x[k];
+    for (int i = 0; i < 2; i++) {
+      f->points_of[3 * k + (size_t)i] = greville[i][at[i]];
+      place[i] = to_unit(f->domain[i], greville[i][at[i]]);
+    }
+    z += f->plane[0] + f->plane[1] * place[0] + f->plane[2] * place[1];
+    f->points_of[3 * k + 2] = z * f->sign / f->scale;
+  }
+  double sum = 0, worst = -1;
+  for (size_t k = 0; k < f->count; k++) {
+    double off = fabs(value_at(f, f->points + 3 * k) - f->points[3 * k + 2]);
+    sum += f->weights[k] * f->total_weight * off * off;
+    if (off > worst) {
+      worst = off;
+      *max_index = k;
+    }
+  }
+  *lsq = sum;
+  *max_error = worst;
+  return batten_surface_create(f->ctx, &form, out);
+}
+
+/* Least and largest Gaussian curvature over a grid in every span pair. */
+static void gauss_range(const function_fit *f, const batten_surface *surface, double *least, double *largest) {
+  enum { GRID = 6 };
+  *least = INFINITY;
+  *largest = -INFINITY;
+  for (size_t s = 0; s < f->space.spans[0] * f->space.spans[1]; s++)
+    for (unsigned g = 0; g < (GRID + 1) * (GRID + 1); g++) {
+      size_t span[2] = {s / f->space.spans[1], s % f->space.spans[1]};
+      double part[2] = {(double)(g / (GRID + 1)) / GRID, (double)(g % (GRID + 1)) / GRID}, place[2], jet[6][3];
+      for (int i = 0; i < 2; i++) {
+        const double *knots = f->caller[i].knots + f->space.span[i][span[i]];
+        place[i] = (1 - part[i]) * knots[0] + part[i] * knots[1];
+      }
+      surface_shape shape;
+      surface_jet(surface, place, jet);
+      if (!surface_shape_make((const double(*)[3])jet, &shape)) continue;
+      *least = fmin(*least, shape.gauss);
+      *largest = fmax(*largest, shape.gauss);
+    }
+}
+
+/* The proof. Where nothing strict can be had: slack, from what is known of the least eigenvalue, and more if that is
+ * not enough. */
+static batten_status prove(function_fit *f, const batten_surface *surface, const function_rounds_info *rounds,
+                           batten_convex_function_info *info) {
+  batten_convexity_options o = batten_convexity_options_default();
+  signed char *signs = batten_alloc(f->ctx, f->space.spans[0] * f->space.spans[1]);
+  if (!signs) return BATTEN_E_NOMEM;
+  for (size_t k = 0; k < f->space.spans[0] * f->space.spans[1]; k++)
+    signs[k] = (signed char)(f->signs[k] * (int)f->sign);
+  o.signs = signs;
+  double width = fmin(f->domain[0][1] - f->domain[0][0], f->domain[1][1] - f->domain[1][0]);
+  double unit = 1 / (f->scale * width * width);
+  batten_status st = BATTEN_OK;
+  if (f->space.opposite) o.slack = fmax(2 * -rounds->margin, 1e-10 * rounds->scale) * unit;
+  for (int attempt = 0; attempt < 5 && st == BATTEN_OK; attempt++) {
+    st = batten_surface_certify_convex(f->ctx, surface, &o, &info->convexity);
+    if (info->convexity.certified || !f->space.opposite) break;
+    o.slack *= 8;
+  }
+  info->slack = o.slack;
+  batten_free(f->ctx, signs);
+  return st;
+}
+
+static void fill_info(const function_fit *f, const function_rounds_info *rounds, batten_convex_function_info *info) {
+  double unit = 1 / (f->scale * f->scale);
+  info->unknowns = f->space.n;
+  info->objective = rounds->objective * unit;
+  info->objective_lower = fmin(rounds->lower, rounds->objective) * unit;
+  info->lsq_lower = fmin(rounds->squares_lower * unit * f->total_weight, info->lsq);
+  info->rms = sqrt(info->lsq / f->total_weight);
+  info->rounds = rounds->rounds;
+  memcpy(info->rows_per_round, rounds->rows, sizeof rounds->rows);
+  info->rows_outer = rounds->cuts;
+  info->time_rows_s = rounds->time_rows;
+  info->time_qp_s = rounds->time_qp;
+}
+
+static batten_status allocate(function_fit *f) {
+  size_t n = f->space.n;
+  f->x = batten_alloc_array(f->ctx, 5 * n, sizeof *f->x);
+  if (!f->x) return BATTEN_E_NOMEM;
+  f->unconstrained = f->x + n;
+  f->points_of = f->x + 2 * n;
+  return BATTEN_OK;
+}
+
+static void release(function_fit *f) {
+  for (int i = 0; i < 2; i++) {
+    batten_free(f->ctx, f->knots[i]);
+    batten_free(f->ctx, f->space.span[i]);
+  }
+  batten_free(f->ctx, f->signs);
+  batten_free(f->ctx, f->scaled);
+  batten_free(f->ctx, f->x);
+}
+
+/* Where the squares, in units of the scaled z, are as good as nothing: a millionth of z is no difference. */
+static const double floor_of_squares = 1e-12;
+
+static batten_status judge(const function_fit *f, const batten_convex_function_info *info, double floor) {
+  double gap = info->objective - info->objective_lower;
+  if (!info->convexity.certified)
+    return batten_fail(f->ctx, BATTEN_W_ACCURACY,
+                       "convexity is not proven near (%g, %g); use fewer spans, or more rounds",
+                       info->convexity.worst_at[0], info->convexity.worst_at[1]);
+  if (gap > f->opt.gap_tol * info->objective_lower + floor / (f->scale * f->scale))
+    return batten_fail(
+        f->ctx, BATTEN_W_STOPPED,
+        "the mean square with tension is %.6g, that of the best such function at least %.6g: more than "
+        "gap_tol = %g apart; use more rounds",
+        info->objective, info->objective_lower, f->opt.gap_tol);
+  return BATTEN_OK;
+}
+
+batten_status batten_convex_function_fit(batten_context *ctx, size_t count, const double *points,
+                                         const batten_convex_function_options *opt, batten_surface **out,
+                                         batten_surface **unconstrained, batten_convex_function_info *info) {
+  function_fit f = {.ctx = ctx, .count = count, .points = points};
+  f.opt = opt ? *opt : batten_convex_function_options_default();
+  function_terms terms = {0};
+  function_rounds_info rounds;
+  batten_convex_function_info found = {0};
+  batten_surface *surface = NULL, *free_surface = NULL;
+  batten_status st = check(&f);
+  if (st == BATTEN_OK) st = make_space(&f);
+  if (st == BATTEN_OK) st = make_signs(&f);
+  if (st == BATTEN_OK) st = scale_points(&f);
+  if (st == BATTEN_OK) st = allocate(&f);
+  if (st == BATTEN_OK) st = function_terms_make(ctx, &f.space, count, f.scaled, f.weights, f.opt.tension, &terms);
+  if (st < 0) goto done;
+  size_t fine = f.space.n; /* second derivatives of coefficients that are right to rounding */
+  double noise = 4 * DBL_EPSILON * f.noise * (double)(fine + 64);
+  function_rounds_options how = {f.opt.rounds, f.opt.gap_tol, floor_of_squares, noise, false};
+  st = function_rounds(ctx, &f.space, &terms, &how, f.x, f.unconstrained, &rounds);
+  if (st < 0) goto done;
+  double error, gauss;
+  size_t index;
+  st = make_surface(&f, f.unconstrained, &free_surface, &found.lsq_unconstrained, &error, &index);
+  if (st == BATTEN_OK) st = make_surface(&f, f.x, &surface, &found.lsq, &found.max_error, &found.max_error_index);
+  if (st < 0) goto done;
+  double begin = batten_now();
+  gauss_range(&f, free_surface, &found.gauss_min_unconstrained, &gauss);
+  gauss_range(&f, surface, &found.gauss_min, &found.gauss_max);
+  st = prove(&f, surface, &rounds, &found);
+  if (st < 0) goto done;
+  found.time_check_s = batten_now() - begin;
+  fill_info(&f, &rounds, &found);
+  st = judge(&f, &found, how.floor);
+  *out = surface;
+  surface = NULL;
+  if (unconstrained) {
+    *unconstrained = free_surface;
+    free_surface = NULL;
+  }
+  if (info) *info = found;
+done:
+  batten_surface_free(surface);
+  batten_surface_free(free_surface);
+  function_terms_free(ctx, &terms);
+  release(&f);
+  return st;
+}
