@@ -342,7 +342,7 @@ static void describe(drawing *d, const batten_picture_options *view, const char 
 }
 
 static void caption(drawing *d, size_t count, double step, bool alone) {
-  int length = snprintf(d->plot_caption, TEXT, "K from %.4g to %.4g", d->least, d->most);
+  int length = snprintf(d->plot_caption, TEXT, "K from %.3g to %.3g", d->least, d->most);
   bool below = d->least<d->from, above = d->most> d->to;
   char *rest = d->plot_caption + length;
   size_t room = TEXT - (size_t)length;

@@ -196,12 +196,10 @@ static batten_status draw_small(batten_context *ctx, void *arg) {
   batten_picture_options first = batten_picture_options_default(), second = first, whole = first;
   first.lines = lines, first.line_count = 2, first.points = v, first.point_count = 3, first.title = "A";
   second.axes = &axes, second.colors = second.normals = v, second.caption = "b";
-  batten_picture_panel panels[] = {{.mesh = ball, .opt = &first, .group = 1},
-                                   {.mesh = ball, .group = 1},
-                                   {.mesh = NULL},
-                                   {.mesh = ball, .opt = &second}};
+  const batten_picture_panel panels[] = {
+      {.mesh = ball, .opt = &first, .group = 1}, {.mesh = NULL}, {.mesh = ball, .opt = &second, .group = 1}};
   whole.width = 72, whole.height = 64, whole.title = "whole";
-  batten_status st = batten_picture_panels(ctx, 2, 2, panels, &whole, arg);
+  batten_status st = batten_picture_panels(ctx, 1, 3, panels, &whole, arg);
   batten_mesh_free(ball);
   return st;
 }
