@@ -55,6 +55,33 @@ static void along_u(unsigned width0, unsigned count0, unsigned count1, double (*
     }
 }
 
+/* Takes from the second derivatives what they have along x_u and x_v, by least squares over the box and as seen along
+ * its normal. */
+static void remove_along(convex_patch *p, size_t net, double (*first)[CONVEX_NET][3]) {
+  const double *g = p->normal;
+  double normal[3] = {0}, right[3][2] = {{0}};
+  for (size_t i = 0; i < net; i++) {
+    const double *u = first[0][i], *v = first[1][i];
+    double gu = vec_dot(g, u), gv = vec_dot(g, v);
+    normal[0] += vec_dot(u, u) - gu * gu;
+    normal[1] += vec_dot(u, v) - gu * gv;
+    normal[2] += vec_dot(v, v) - gv * gv;
+    for (int h = 0; h < 3; h++) {
+      double gw = vec_dot(g, p->second[h][i]);
+      right[h][0] += vec_dot(p->second[h][i], u) - gw * gu;
+      right[h][1] += vec_dot(p->second[h][i], v) - gw * gv;
+    }
+  }
+  double det = normal[0] * normal[2] - normal[1] * normal[1];
+  for (int h = 0; h < 3; h++) {
+    double *along = p->along[h];
+    along[0] = det > 0 ? (normal[2] * right[h][0] - normal[1] * right[h][1]) / det : 0;
+    along[1] = det > 0 ? (normal[0] * right[h][1] - normal[1] * right[h][0]) / det : 0;
+    for (size_t i = 0; i < net; i++)
+      for (int k = 0; k < 3; k++) p->second[h][i][k] -= along[0] * first[0][i][k] + along[1] * first[1][i][k];
+  }
+}
+
 bool convex_patch_set(convex_patch *p, const convex_space *space, const double *reference, const convex_box *box) {
   unsigned m = space->axis[0].degree, n = space->axis[1].degree;
   assert(m <= CONVEX_DEGREE && n <= CONVEX_DEGREE);
@@ -64,14 +91,16 @@ bool convex_patch_set(convex_patch *p, const convex_space *space, const double *
     memcpy(p->points[i * (n + 1)], reference + ((box->span[0] - m + i) * space->axis[1].count + box->span[1] - n) * 3,
            (n + 1) * sizeof *p->points);
 
-  double half[CONVEX_NET][3];
+  double half[CONVEX_NET][3], first[2][CONVEX_NET][3];
   const convex_axis_rows *u = &p->rows[0], *v = &p->rows[1];
   along_v(m + 1, n + 1, n + 1, p->points, v->value, half);
   along_u(m + 1, m, n + 1, half, u->first, p->first_u);
+  along_u(m + 1, m + 1, n + 1, half, u->first_raised, first[0]);
   along_u(m + 1, m + 1, n + 1, half, u->second_raised, p->second[0]);
   along_v(m + 1, n + 1, n, p->points, v->first, half);
   along_u(m + 1, m + 1, n, half, u->value, p->first_v);
   along_v(m + 1, n + 1, n + 1, p->points, v->first_raised, half);
+  along_u(m + 1, m + 1, n + 1, half, u->value, first[1]);
   along_u(m + 1, m + 1, n + 1, half, u->first_raised, p->second[1]);
   along_v(m + 1, n + 1, n + 1, p->points, v->second_raised, half);
   along_u(m + 1, m + 1, n + 1, half, u->value, p->second[2]);
@@ -83,8 +112,11 @@ bool convex_patch_set(convex_patch *p, const convex_space *space, const double *
     for (int k = 0; k < 3; k++) mean[1][k] += p->first_v[i][k];
   if (!vec_normalize(mean[0]) || !vec_normalize(mean[1])) return false;
   vec_cross(mean[0], mean[1], p->normal);
-  return vec_normalize(p->normal) && convex_cone_bound(m * (n + 1), p->first_u, p->normal, &p->cone[0]) &&
-         convex_cone_bound((m + 1) * n, p->first_v, p->normal, &p->cone[1]);
+  if (!vec_normalize(p->normal) || !convex_cone_bound(m * (n + 1), p->first_u, p->normal, &p->cone[0]) ||
+      !convex_cone_bound((m + 1) * n, p->first_v, p->normal, &p->cone[1]))
+    return false;
+  remove_along(p, (m + 1) * (n + 1), first);
+  return true;
 }
 
 /* M^(-1/2) of [a, b; b, c], up to a factor: by Cayley and Hamilton the root is (M + sqrt(det) I) over a number. */

@@ -138,9 +138,13 @@ static void write_forms(writer *w, const convex_patch *p, const convex_box *box,
                    *v2 = p->rows[1].second_raised + s * (n + 1);
       for (unsigned a = 0; a < directions; a++) {
         const double *form = p->form[a];
+        double along[2] = {0}; /* of x_u and x_v that the form's combination loses */
+        for (int h = 0; h < 3; h++)
+          for (int k = 0; k < 2; k++) along[k] += form[h] * p->along[h][k];
         for (size_t i = 0; i <= m; i++) {
-          double uu = form[0] * u2[i], uv = form[1] * u1[i], vv = form[2] * u0[i];
-          for (size_t j = 0; j <= n; j++) c[i * (n + 1) + j] = uu * v0[j] + uv * v1[j] + vv * v2[j];
+          double w0 = form[0] * u2[i] - along[0] * u1[i], w1 = form[1] * u1[i] - along[1] * u0[i],
+                 w2 = form[2] * u0[i];
+          for (size_t j = 0; j <= n; j++) c[i * (n + 1) + j] = w0 * v0[j] + w1 * v1[j] + w2 * v2[j];
         }
         write_rows(w, p, box, c, p->ray_count, rays);
       }

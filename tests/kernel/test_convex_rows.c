@@ -351,7 +351,8 @@ static void test_invariance(void) {
 
     for (int exponent = -61; exponent <= 60; exponent += 11) {
       *t = *s;
-      for (size_t i = 0; i < n; i++) t->reference[0][i] = ldexp(s->reference[0][i], exponent);
+      for (size_t i = 0; i < points; i++)
+        for (int k = 0; k < 3; k++) t->reference[i][k] = ldexp(s->reference[i][k], exponent);
       convex_rows_make(ctx, &s->space, t->reference[0], &defaults, &accepted_too, &others);
       bool same = accepted_too && others.matrix.rows == rows.matrix.rows && others.boxes == rows.boxes;
       same = same && memcmp(kind ? others.matrix.values : others.matrix.dense,
@@ -491,6 +492,7 @@ static void test_refused(void) {
     T_CHECK(enough || o.depth_max < depth, "depth_max %u: %s", o.depth_max, enough ? "accepted" : "refused");
     T_CHECK(!enough || o.depth_max > 0, "no depth, no bisection");
   }
+  set_cap(s, 1.2, 0, &seed);
   for (unsigned directions = 3; directions <= 16; directions += directions < 8 ? 1 : 4) {
     o = defaults;
     o.directions = directions;
@@ -498,6 +500,40 @@ static void test_refused(void) {
     printf("# %u directions: %zu boxes, %zu rows\n", directions, rows.boxes, rows.matrix.rows);
     T_CHECK(accepted, "%u directions", directions);
     if (accepted) convex_rows_free(ctx, &rows);
+  }
+  free(s);
+  batten_context_free(ctx);
+}
+
+/* A paraboloid with parameters that run unevenly, u -> u + bend u (1 - u), has large second derivatives along the
+ * surface; they do not count. Control points by interpolation: the degree is 4, the space holds it. */
+static void test_parameters_along(void) {
+  batten_context *ctx = plain();
+  scene *s = malloc(sizeof *s);
+  unsigned degree[2] = {4, 4}, smoothness[2] = {3, 3};
+  size_t spans[2] = {1, 1};
+  set_space(s, degree, smoothness, spans);
+  /* 1, 4, 25 and too many with them. */
+  static const size_t most[4] = {1, 1, 12, 100};
+  for (int k = 0; k <= 3; k++) {
+    double bend = 0.3 * k;
+    /* Bernstein coefficients of degree 4 of p = u + bend u (1 - u) - 1/2 and of its square. */
+    double two[3] = {-0.5, (1 + bend) / 2 - 0.5, 0.5}, p[5], q[5] = {0};
+    static const double raise[5][3] = {{1, 0, 0}, {0.5, 0.5, 0}, {1. / 6, 4. / 6, 1. / 6}, {0, 0.5, 0.5}, {0, 0, 1}};
+    static const double choose[5] = {1, 4, 6, 4, 1};
+    for (int i = 0; i < 5; i++) p[i] = raise[i][0] * two[0] + raise[i][1] * two[1] + raise[i][2] * two[2];
+    for (int i = 0; i < 3; i++)
+      for (int j = 0; j < 3; j++) q[i + j] += (i == 1 ? 2 : 1) * (j == 1 ? 2 : 1) / choose[i + j] * two[i] * two[j];
+    for (int i = 0; i < 5; i++)
+      for (int j = 0; j < 5; j++) {
+        double point[3] = {p[i], p[j], (q[i] + q[j]) / 2};
+        memcpy(s->reference[5 * i + j], point, sizeof point);
+      }
+    bool accepted;
+    convex_rows rows = {0};
+    convex_rows_make(ctx, &s->space, s->reference[0], &defaults, &accepted, &rows);
+    T_CHECK(accepted && rows.boxes <= most[k], "a paraboloid, parameters bent by %.1f: %zu boxes", bend, rows.boxes);
+    convex_rows_free(ctx, &rows);
   }
   free(s);
   batten_context_free(ctx);
@@ -529,6 +565,7 @@ int main(void) {
   test_theorem();
   test_invariance();
   test_refused();
+  test_parameters_along();
   test_memory();
   return t_done();
 }
