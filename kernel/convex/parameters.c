@@ -1,17 +1,19 @@
-/* Parameters of scattered points: options, checks, and projection into the best plane. See <batten/convex.h>. */
+/* Parameters of scattered points: options, checks, projection into the best plane. See <batten/convex.h>. */
 #include <string.h>
 
 #include "base/checked.h"
 #include "convex_inner.h"
+#include "floater.h"
 #include "plane.h"
 
 batten_parametrize_options batten_parametrize_options_default(void) {
   return (batten_parametrize_options){.struct_size = sizeof(batten_parametrize_options)};
 }
 
-static batten_status project(batten_context *ctx, size_t count, const double *points, double *uv) {
+static batten_status project(batten_context *ctx, size_t count, const double *points, const convex_scale *scale,
+                             double *uv) {
   double size[2], axes[2][3];
-  batten_status st = convex_plane_project(ctx, count, points, uv, size, axes);
+  batten_status st = convex_plane_project(ctx, count, points, scale, uv, size, axes);
   if (st < 0) return st;
   for (size_t i = 0; i < count; i++)
     for (size_t k = 0; k < 2; k++) uv[2 * i + k] /= size[k];
@@ -46,12 +48,17 @@ batten_status batten_parametrize(batten_context *ctx, size_t count, const double
   if (count < 3) return batten_fail(ctx, BATTEN_E_INVALID, "count: %zu; a surface needs three points", count);
   st = batten_progress(ctx, "parameters", 0);
   if (st < 0) return st;
+  convex_scale scale;
+  st = convex_scale_find(ctx, count, points, &scale);
+  if (st < 0) return st;
   double *uv = batten_alloc_array(ctx, count, 2 * sizeof *uv);
   if (!uv) return BATTEN_E_NOMEM;
-  st = o.method == BATTEN_PARAMETERS_PROJECT
-           ? project(ctx, count, points, uv)
-           : batten_fail(ctx, BATTEN_E_INVALID, "opt.method: FLOATER is not there; take PROJECT");
-  if (st >= 0) st = batten_progress(ctx, "parameters", 1);
+  st = o.method == BATTEN_PARAMETERS_PROJECT ? project(ctx, count, points, &scale, uv)
+                                             : convex_floater(ctx, count, points, &scale, &o, uv);
+  if (st >= 0) {
+    batten_status go = batten_progress(ctx, "parameters", 1);
+    if (go < 0) st = go;
+  }
   if (st >= 0) memcpy(parameters, uv, count * 2 * sizeof *uv);
   batten_free(ctx, uv);
   return st;

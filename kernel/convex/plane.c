@@ -14,7 +14,6 @@
 #include "plane.h"
 
 #include <float.h>
-#include <stdbool.h>
 #include <stdint.h>
 
 #include "base/checked.h"
@@ -26,52 +25,65 @@
 /* Areas nearer to each other than this part are equal: far above rounding, far below what a user would see. */
 static const double AREA_TIE = 1e-9;
 
-typedef struct frame {
-  double scale;           /* of the points, then of their distances from the middle: powers of two */
-  double middle[3], unit; /* coordinate: ((point * scale) - middle) * unit */
-  double axis[3][3];      /* in the plane, in the plane, normal: a right-handed system */
-  double rounding;        /* of coordinates, in the same unit */
-} frame;
-
-static void local_point(const frame *f, const double *point, double *out) {
-  for (int k = 0; k < 3; k++) out[k] = (point[k] * f->scale - f->middle[k]) * f->unit;
-}
-
-/* Scales that keep squares in range wherever the points lie. false: all at one place. */
-static bool find_scale(size_t count, const double *points, frame *f) {
+batten_status convex_scale_find(batten_context *ctx, size_t count, const double *points, convex_scale *out) {
+  size_t bad = batten_first_nonfinite(3 * count, points);
+  if (bad < 3 * count)
+    return batten_fail(ctx, BATTEN_E_INVALID, "points[%zu]: coordinate %zu is %g; must be finite", bad / 3, bad % 3,
+                       points[bad]);
+  convex_scale s = {.scale = 1};
   double lower[3], upper[3], largest = 0, extent = 0;
-  for (int k = 0; k < 3; k++) {
+  for (size_t k = 0; k < 3; k++) {
     lower[k] = upper[k] = points[k];
     for (size_t i = 1; i < count; i++) {
-      lower[k] = fmin(lower[k], points[3 * i + (size_t)k]);
-      upper[k] = fmax(upper[k], points[3 * i + (size_t)k]);
+      lower[k] = fmin(lower[k], points[3 * i + k]);
+      upper[k] = fmax(upper[k], points[3 * i + k]);
     }
     largest = fmax(largest, fmax(fabs(lower[k]), fabs(upper[k])));
   }
-  if (!(largest > 0)) return false;
-  f->scale = batten_unit(largest);
+  if (largest > 0) s.scale = batten_unit(largest);
   for (int k = 0; k < 3; k++) {
-    f->middle[k] = 0.5 * (lower[k] * f->scale + upper[k] * f->scale);
-    extent = fmax(extent, upper[k] * f->scale - lower[k] * f->scale);
+    s.middle[k] = 0.5 * (lower[k] * s.scale + upper[k] * s.scale);
+    extent = fmax(extent, upper[k] * s.scale - lower[k] * s.scale);
   }
-  if (!(extent > 0)) return false;
-  f->unit = batten_unit(extent);
-  f->rounding = DBL_EPSILON * largest * f->scale * f->unit;
-  return true;
+  if (!(extent > 0))
+    return batten_fail(ctx, BATTEN_E_INVALID, "points: all %zu lie at one place; a surface needs three corners",
+                       count);
+  s.unit = batten_unit(extent);
+  s.rounding = DBL_EPSILON * largest * s.scale * s.unit;
+  *out = s;
+  return BATTEN_OK;
 }
+
+void convex_scale_apply(const convex_scale *s, const double *point, double out[3]) {
+  for (int k = 0; k < 3; k++) out[k] = (point[k] * s->scale - s->middle[k]) * s->unit;
+}
+
+double convex_plane_suits_u(const double normal[3], const double direction[3]) {
+  int largest = 0;
+  for (int k = 1; k < 3; k++)
+    if (fabs(normal[k]) > fabs(normal[largest])) largest = k;
+  /* The third axis decides where two sides lie at 45 degrees to the one that counts. */
+  return direction[(largest + 1) % 3] + AREA_TIE * direction[(largest + 2) % 3];
+}
+
+/* The principal axes: two in the plane, and the normal; a right-handed system. */
+typedef struct frame {
+  const convex_scale *scale;
+  double axis[3][3];
+} frame;
 
 /* Principal axes, the normal's largest coordinate positive. */
 static void find_axes(size_t count, const double *points, const uint32_t *order, frame *f) {
   double mean[3] = {0}, moment[9] = {0}, values[3], vectors[9];
   for (size_t i = 0; i < count; i++) {
     double x[3];
-    local_point(f, points + 3 * (size_t)order[i], x);
+    convex_scale_apply(f->scale, points + 3 * (size_t)order[i], x);
     for (int k = 0; k < 3; k++) mean[k] += x[k];
   }
   for (int k = 0; k < 3; k++) mean[k] /= (double)count;
   for (size_t i = 0; i < count; i++) {
     double x[3];
-    local_point(f, points + 3 * (size_t)order[i], x);
+    convex_scale_apply(f->scale, points + 3 * (size_t)order[i], x);
     vec_sub(x, mean, x);
     for (int k = 0; k < 3; k++)
       for (int j = k; j < 3; j++) moment[3 * k + j] += x[k] * x[j];
@@ -157,18 +169,13 @@ static double turn_calipers(const caliper *c, double *area) {
 
 /* Of the four directions of the sides of a rectangle along d: u, and how well it suits. */
 static double choose_side(const frame *f, const double *d, double *u) {
-  int largest = 0;
-  for (int k = 1; k < 3; k++)
-    if (f->axis[2][k] > f->axis[2][largest]) largest = k;
-  int along = (largest + 1) % 3, then = (largest + 2) % 3;
   double best = -INFINITY, turned[2] = {d[0], d[1]};
   u[0] = d[0];
   u[1] = d[1];
   for (int quarter = 0; quarter < 4; quarter++) {
     double component[3];
     for (int k = 0; k < 3; k++) component[k] = turned[0] * f->axis[0][k] + turned[1] * f->axis[1][k];
-    /* The second axis decides where two sides lie at 45 degrees to the first. */
-    double score = component[along] + AREA_TIE * component[then];
+    double score = convex_plane_suits_u(f->axis[2], component);
     if (score > best) {
       best = score;
       u[0] = turned[0];
@@ -214,19 +221,12 @@ static void turn_to_sides(size_t count, const double *u, double *flat, double *s
     }
 }
 
-batten_status convex_plane_project(batten_context *ctx, size_t count, const double *points, double *flat,
-                                   double size[2], double axes[2][3]) {
-  size_t bad = batten_first_nonfinite(3 * count, points);
-  if (bad < 3 * count)
-    return batten_fail(ctx, BATTEN_E_INVALID, "points[%zu]: coordinate %zu is %g; must be finite", bad / 3, bad % 3,
-                       points[bad]);
+batten_status convex_plane_project(batten_context *ctx, size_t count, const double *points, const convex_scale *scale,
+                                   double *flat, double size[2], double axes[2][3]) {
   if (count > UINT32_MAX / 2)
     return batten_fail(ctx, BATTEN_E_TOO_LARGE, "count: %zu; at most %u points have parameters", count,
                        UINT32_MAX / 2);
-  frame f;
-  if (!find_scale(count, points, &f))
-    return batten_fail(ctx, BATTEN_E_INVALID, "points: all %zu lie at one place; a surface needs three corners",
-                       count);
+  frame f = {.scale = scale};
   uint32_t *order = batten_alloc_array(ctx, count, sizeof *order);
   uint32_t *hull = order ? batten_alloc_array(ctx, 2 * count, sizeof *hull) : NULL;
   double *area = NULL, u[2] = {1, 0};
@@ -236,7 +236,7 @@ batten_status convex_plane_project(batten_context *ctx, size_t count, const doub
   find_axes(count, points, order, &f);
   for (size_t i = 0; i < count; i++) {
     double x[3];
-    local_point(&f, points + 3 * i, x);
+    convex_scale_apply(scale, points + 3 * i, x);
     for (size_t k = 0; k < 2; k++) flat[2 * i + k] = vec_dot(x, f.axis[k]);
   }
   st = batten_sort_points(ctx, 2, count, flat, order);
@@ -251,7 +251,7 @@ batten_status convex_plane_project(batten_context *ctx, size_t count, const doub
   turn_to_sides(count, u, flat, size);
   double least = fmin(size[0], size[1]);
   /* 16: coordinates are rounded, their differences once more, and a turn adds up six products. */
-  if (c.corners < 3 || least <= 16 * f.rounding) {
+  if (c.corners < 3 || least <= 16 * scale->rounding) {
     st = batten_fail(ctx, BATTEN_E_INVALID,
                      "points: all %zu lie on a line to the rounding of their coordinates; a surface needs points "
                      "beside it",

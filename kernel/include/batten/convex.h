@@ -27,7 +27,9 @@ typedef enum batten_parametrization {
   BATTEN_PARAMETERS_FLOATER   /* shape-preserving [Floater 1997]: the boundary of a triangulation goes to the boundary
                                  of the square by chord length, its corners to four of its vertices, and every inner
                                  vertex is a convex combination of its neighbours. Without triangles: those of Delaunay
-                                 in the best plane. */
+                                 in the best plane, less those at the rim that cover wide gaps of the data (the circle
+                                 in them is more than 4 times that in 90 % of all triangles) or are flat to rounding;
+                                 points at one place there get the same parameters. */
 } batten_parametrization;
 
 typedef struct batten_parametrize_options {
@@ -35,16 +37,22 @@ typedef struct batten_parametrize_options {
   batten_parametrization method; /* default AUTO */
   size_t triangle_count;         /* of a triangulation of the points: a disc; every point in it */
   const uint32_t *triangles;     /* [triangle_count][3] */
-  const uint32_t *corners; /* [4] boundary points in their order that go to (0,0), (1,0), (1,1), (0,1); NULL = those
-                              where the boundary turns most, FLOATER. Default NULL. */
+  const uint32_t *corners; /* [4] boundary points, counter-clockwise, that go to (0,0), (1,0), (1,1), (0,1); NULL =
+                              those where the boundary turns most as seen over 1/16 of its length to both sides, with
+                              a small premium on even sides (a boundary of three points: to (0,0), (1,0), (0,1)).
+                              FLOATER. Default NULL. */
 } batten_parametrize_options;
 BATTEN_API batten_parametrize_options batten_parametrize_options_default(void);
 
-/* points [count][3] -> parameters [count][2] in [0, 1]^2. The same for points that are moved, turned (PROJECT: up to
- * which side is which) or scaled. u x v runs counter-clockwise about the plane's normal, whose largest coordinate is
- * positive (FLOATER with triangles: about theirs). Cost: O(n log n); FLOATER solves a sparse system of n unknowns.
- * Progress phase "parameters". Fails: INVALID (points on a line; triangles that are no disc), NOMEM, TOO_LARGE,
- * CANCELLED. */
+/* points [count][3] -> parameters [count][2] in [0, 1]^2. The same for points that are moved, turned (up to which
+ * side is which) or scaled; PROJECT: same bits for any order of the points and for scaling by a power of two. u x v
+ * runs counter-clockwise about the plane's normal, whose largest coordinate is positive (FLOATER with triangles:
+ * about theirs); u is the side that points most along the coordinate axis which follows that largest one (x after z).
+ * FLOATER folds no triangle, and reproduces points of a plane in a rectangle but for its scale; points in a plane
+ * within another outline are bent to the square. Cost: O(n log n); FLOATER solves a sparse system of n unknowns
+ * directly, O(n^1.5). BATTEN_W_ACCURACY: done, but triangles vanish to the rounding of parameters (a nearly closed
+ * surface); the text says where. Progress phase "parameters". Fails: INVALID (points on a line; triangles that are no
+ * disc, named), NOMEM, TOO_LARGE, CANCELLED. */
 BATTEN_API batten_status batten_parametrize(batten_context *ctx, size_t count, const double *points,
                                             const batten_parametrize_options *opt, double *parameters);
 
