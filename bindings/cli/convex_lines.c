@@ -96,6 +96,9 @@ batten_status convex_span_curves(batten_context *ctx, const batten_surface *surf
 
 enum { ELLIPSES = 7 /* in either direction */, ELLIPSE_PIECES = 40 };
 
+/* Curvatures that are less, of 1 / distance between ellipses, are those of a plane but for rounding. */
+static const double flat_curvature = 1e-7;
+
 static int compare_doubles(const void *a, const void *b) {
   double x = *(const double *)a, y = *(const double *)b;
   return (x > y) - (x < y);
@@ -169,7 +172,8 @@ batten_status convex_ellipses(batten_context *ctx, const batten_surface *surface
   for (size_t i = 0; i < COUNT; i++)
     for (size_t k = 0; k < 2; k++)
       if (isfinite(points[i].principal[k])) largest = fmax(largest, fabs(points[i].principal[k]));
-  double scale = 0.9 * usual_gap(points, gaps) / largest;
+  double gap = usual_gap(points, gaps), scale = 0.9 * gap / largest;
+  if (!(largest * gap > flat_curvature)) goto done;
   for (size_t i = 0; st >= 0 && i < COUNT && isfinite(scale); i++)
     st = add_ellipse(ctx, &points[i], frame, scale, out);
 done:

@@ -24,8 +24,10 @@ typedef struct drawing {
   const batten_surface *surface;
   bool ellipses;
   convex_grid grid;
-  double from, to; /* range of the plot */
-  double least, most;
+  double from, to;    /* range of the plot */
+  double least, most; /* K on the grid */
+  double size;        /* diagonal of its box */
+  bool flat;
   batten_mesh *space, *plot;
   double *normals, *tones;
   convex_segments net, knots, spans, ellipse, plot_lines;
@@ -176,6 +178,12 @@ static batten_status make_space(batten_context *ctx, drawing *d, const convex_fr
     convex_to_frame(frame, d->grid.points[i].normal, d->normals + 3 * i);
     for (size_t k = 0; flipped && k < 3; k++) d->normals[3 * i + k] = -d->normals[3 * i + k];
   }
+  double lower[3] = {INFINITY, INFINITY, INFINITY}, upper[3] = {-INFINITY, -INFINITY, -INFINITY};
+  for (size_t i = 0; i < 3 * (size_t)PLACES; i++) {
+    lower[i % 3] = fmin(lower[i % 3], vertices[i]);
+    upper[i % 3] = fmax(upper[i % 3], vertices[i]);
+  }
+  d->size = hypot(hypot(upper[0] - lower[0], upper[1] - lower[1]), upper[2] - lower[2]);
   batten_status st = grid_mesh(ctx, vertices, NULL, flipped, &d->space);
   batten_free(ctx, vertices);
   return st;
@@ -186,8 +194,14 @@ static int compare_doubles(const void *a, const void *b) {
   return (x > y) - (x < y);
 }
 
-/* The plot's range: that of all K, but not farther from where 96 % of them are than these spread themselves: a spike
- * at a corner does not press the rest flat. */
+/* Values that are less, of 1 / size^2, are rounding: the surface is flat. */
+static const double flat_gauss = 1e-9;
+
+/* A part of the range of K is left out where the rest would be pressed flat by it, into a third of the height. */
+static const double worth_cutting = 3;
+
+/* The plot's range: that of all K, or, where there are spikes, so far beyond where 96 % of them are as these spread
+ * themselves. */
 static batten_status choose_range(batten_context *ctx, drawing *d) {
   double *sorted = batten_alloc_array(ctx, PLACES, sizeof *sorted);
   if (!sorted) return BATTEN_E_NOMEM;
@@ -200,13 +214,17 @@ static batten_status choose_range(batten_context *ctx, drawing *d) {
   double low = n ? sorted[n / 50] : 0, high = n ? sorted[n - 1 - n / 50] : 0, spread = high - low;
   d->from = fmax(d->least, low - spread);
   d->to = fmin(d->most, high + spread);
+  if (d->most - d->least <= worth_cutting * (d->to - d->from)) d->from = d->least, d->to = d->most;
   if (d->from > 0 && d->from < 0.8 * d->to) d->from = 0;
   if (d->to < 0 && d->to > 0.8 * d->from) d->to = 0;
-  double largest = fmax(fabs(d->from), fabs(d->to));
-  if (!(d->to - d->from > 1e-9 * largest)) { /* one value */
-    double margin = largest > 0 ? 0.5 * largest : 1;
-    d->from -= margin;
-    d->to += margin;
+  double largest = fmax(fabs(d->from), fabs(d->to)), unit = 1 / (d->size * d->size);
+  d->flat = !(largest > flat_gauss * unit);
+  if (d->flat) {
+    d->from = isfinite(unit) && unit > 0 ? -unit : -1;
+    d->to = -d->from;
+  } else if (!(d->to - d->from > 1e-9 * largest)) { /* one value */
+    d->from -= 0.5 * largest;
+    d->to += 0.5 * largest;
   }
   batten_free(ctx, sorted);
   return BATTEN_OK;
@@ -217,7 +235,7 @@ static batten_status choose_range(batten_context *ctx, drawing *d) {
 static double tone_of(const drawing *d, double gauss) {
   double end = gauss < 0 ? d->from : d->to;
   if (!isfinite(gauss)) return NAN;
-  if (gauss == 0 || end == 0) return 0;
+  if (gauss == 0 || end == 0 || d->flat) return 0;
   return copysign(sqrt(fmin(1, gauss / end)), gauss);
 }
 
@@ -231,7 +249,7 @@ static batten_status make_plot(batten_context *ctx, drawing *d) {
   st = choose_range(ctx, d);
   if (st < 0) goto done;
   for (size_t i = 0; i < PLACES; i++) {
-    double gauss = d->grid.points[i].gauss;
+    double gauss = d->flat ? 0 : d->grid.points[i].gauss;
     missing[i] = !isfinite(gauss);
     values[i] = gauss;
     vertices[3 * i] = (double)(i / SIDE) / GRID;
@@ -250,7 +268,7 @@ static batten_status make_plot(batten_context *ctx, drawing *d) {
         st = convex_add_segment(ctx, &d->plot_lines, vertices + 3 * c, vertices + 3 * e);
     }
   const double zero = 0;
-  if (st >= 0) st = batten_mesh_level_lines(ctx, d->plot, values, 1, &zero, &d->zero_count, &d->zero);
+  if (st >= 0 && !d->flat) st = batten_mesh_level_lines(ctx, d->plot, values, 1, &zero, &d->zero_count, &d->zero);
 done:
   batten_free(ctx, missing);
   batten_free(ctx, values);
@@ -301,7 +319,7 @@ static batten_picture_lines kind(const convex_segments *s, unsigned color, doubl
 
 static void describe(drawing *d, const batten_picture_options *view, const char *name, const char *plot_name) {
   batten_picture_options *o = &d->space_options;
-  d->space_lines[0] = kind(&d->spans, 0x14161b, 1.2, 0.25);
+  d->space_lines[0] = kind(&d->spans, 0x3f4d63, 1.1, 0.25);
   d->space_lines[1] = (batten_picture_lines){d->level_count, d->levels, 0x14161b, 1.3, 0};
   d->space_lines[2] = kind(&d->ellipse, 0x7a1f5c, 1.7, 0);
   d->space_lines[3] = kind(&d->net, 0x2f6b34, 1.5, 0.35);
@@ -338,19 +356,22 @@ static void describe(drawing *d, const batten_picture_options *view, const char 
     o->color_lower = -1;
     o->color_upper = 1;
     o->no_color_bar = 1;
+    o->both_sides = 1;
   }
 }
 
 static void caption(drawing *d, size_t count, double step, bool alone) {
-  int length = snprintf(d->plot_caption, TEXT, "K from %.3g to %.3g", d->least, d->most);
+  char cut[TEXT / 2] = "";
   bool below = d->least<d->from, above = d->most> d->to;
-  char *rest = d->plot_caption + length;
-  size_t room = TEXT - (size_t)length;
   if (below && above)
-    snprintf(rest, room, ", cut off at %.3g and %.3g", d->from, d->to);
+    snprintf(cut, sizeof cut, ", cut off at %.3g and %.3g", d->from, d->to);
   else if (below || above)
-    snprintf(rest, room, ", cut off at %.3g", below ? d->from : d->to);
-  if (d->ellipses && !alone)
+    snprintf(cut, sizeof cut, ", cut off at %.3g", below ? d->from : d->to);
+  if (d->flat)
+    snprintf(d->plot_caption, TEXT, "K = 0 but for rounding");
+  else
+    snprintf(d->plot_caption, TEXT, "K from %.3g to %.3g%s", d->least, d->most, cut);
+  if (d->ellipse.count && !alone)
     snprintf(d->space_caption, TEXT, "ellipses: diameters as the principal curvatures");
   else
     snprintf(d->space_caption, TEXT, "%zu points, control net, level curves %.3g apart", count, step);

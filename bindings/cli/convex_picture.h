@@ -51,7 +51,7 @@ batten_status convex_net(batten_context *ctx, const batten_surface *surface, con
 /* The boundary of the surface, and the curves where its spans join. */
 batten_status convex_span_curves(batten_context *ctx, const batten_surface *surface, const convex_frame *frame,
                                  convex_segments *out);
-/* Ellipses about a regular grid of places, the largest as wide as is between neighbours. */
+/* Ellipses about a regular grid of places, the largest almost as wide as is between neighbours. None on a plane. */
 batten_status convex_ellipses(batten_context *ctx, const batten_surface *surface, const convex_frame *frame,
                               convex_segments *out);
 #endif

@@ -96,6 +96,7 @@ typedef struct picture_scene {
   float dot_radius;
   float ground;                       /* height of the ground plane */
   bool shadows;                       /* on it; else it is not seen */
+  bool both_sides;                    /* look alike */
   double progress_at, progress_share; /* of the whole picture, before it and its own */
 } picture_scene;
 /* Tells of progress with the scene, part in [0, 1]. */

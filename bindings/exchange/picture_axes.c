@@ -133,7 +133,7 @@ static void draw_scale(const axes_work *w, unsigned k, const axes_edge *e) {
     double at[2];
     for (unsigned j = 0; j < 3; j++) middle[j] = 0.5f * (e->ends[0][j] + e->ends[1][j]);
     to_pixel(w, middle, at);
-    put_text(w, at, direction, reach + 0.5 * unit, 1.05 * unit, label);
+    put_text(w, at, direction, reach + 0.8 * unit, 1.05 * unit, label);
   }
 }
 

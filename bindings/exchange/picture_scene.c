@@ -149,7 +149,8 @@ static batten_status scene_make(batten_context *ctx, picture_view *view) {
                        .map = o->color_map,
                        .triangles = batten_mesh_triangles(mesh),
                        .ground = INFINITY,
-                       .shadows = !o->axes};
+                       .shadows = !o->axes,
+                       .both_sides = o->both_sides != 0};
   for (size_t l = 0; l < o->line_count; l++) s->segment_count += o->lines[l].count;
   double *normals = batten_alloc_array(ctx, V, 3 * sizeof *normals);
   s->vertices = batten_alloc_array(ctx, V, 3 * sizeof *s->vertices);

@@ -411,14 +411,14 @@ static void compose_row(void *arg, size_t y) {
     for (; i < s->row_first[y + 1] && s->points[i].pixel == pixel; i++) {
       const point *p = &s->points[i];
       left -= p->weight;
-      bool below = p->kind == 1 && !s->scene->shadows; /* plots have no inside, and light from below */
-      picture_color albedo = p->kind == 2                        ? dot
-                             : p->kind == 1 && s->scene->shadows ? inside
-                             : s->scene->tones                   ? picture_colormap(s->scene->map, p->tone)
-                                                                 : plain;
-      /* Light from the ground, less where the thing is close to it. */
+      bool alike = p->kind == 1 && s->scene->both_sides;
+      picture_color albedo = p->kind == 2             ? dot
+                             : p->kind == 1 && !alike ? inside
+                             : s->scene->tones        ? picture_colormap(s->scene->map, p->tone)
+                                                      : plain;
+      /* Light from the ground, less where the thing is close to it; what has no inside is not dark there. */
       float height = p->position[2] - s->scene->ground;
-      float bounce = 0.16f * (0.5f - 0.5f * p->normal[2]) * height / (height + 0.35f) + (below ? 0.4f : 0.05f);
+      float bounce = 0.16f * (0.5f - 0.5f * p->normal[2]) * height / (height + 0.35f) + (alike ? 0.3f : 0.05f);
       float gloss = 0.9f * p->gloss;
       float shown[3] = {albedo.r * (p->light[0] + bounce) + gloss, albedo.g * (p->light[1] + bounce) + gloss,
                         albedo.b * (p->light[2] + bounce) + gloss};

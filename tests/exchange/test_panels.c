@@ -186,6 +186,25 @@ static void test_axes(batten_context *ctx) {
   batten_mesh_free(mesh);
 }
 
+/* A sheet seen from below: brown, or as from above. */
+static void test_sides(batten_context *ctx) {
+  const double v[][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}, ones[] = {1, 1, 1, 1};
+  const uint32_t t[] = {0, 1, 2, 0, 2, 3};
+  batten_mesh *mesh = NULL;
+  T_OK(batten_mesh_create(ctx, 4, &v[0][0], 2, t, &mesh), ctx);
+  batten_picture_options o = parted(ones);
+  o.width = 160, o.height = 120, o.elevation_deg = -50;
+  for (o.both_sides = 0; o.both_sides < 2; o.both_sides++) {
+    T_OK(batten_picture_mesh(ctx, mesh, &o, path_a), ctx);
+    pixels p = read_png(path_a);
+    const unsigned char *c = pixel(&p, 80, 58);
+    T_CHECK(is_blue(c) == (o.both_sides == 1), "%s from behind: %d %d %d", o.both_sides ? "blue" : "brown", c[0],
+            c[1], c[2]);
+    free(p.rgb);
+  }
+  batten_mesh_free(mesh);
+}
+
 static batten_status draw_small(batten_context *ctx, void *arg) {
   batten_mesh *ball = make_ball(ctx, 5);
   if (!ball) return BATTEN_E_NOMEM;
@@ -277,6 +296,7 @@ int main(void) {
   test_groups(ctx, ball);
   test_lines(ctx, ball);
   test_axes(ctx);
+  test_sides(ctx);
   test_bad(ctx, ball);
   test_bad_lines(ctx, ball);
   batten_mesh_free(ball);
