@@ -2,6 +2,7 @@
 #include "cli.h"
 #include "network.h"
 #include "qp.h"
+#include "surface.h"
 
 #include <limits.h>
 #include <math.h>
@@ -121,28 +122,43 @@ static size_t count_spans(const batten_surface_form *form, int direction) {
   return count;
 }
 
-static batten_status tell_surface(cli_run *run, const char *path, bool print, cli_report *r) {
-  batten_surface *surface = NULL;
-  batten_status st = batten_read_surface(run->ctx, path, &surface);
-  if (st < 0) return st;
-  batten_surface_form form = batten_surface_get(surface);
+static void tell_form(const batten_surface_form *form, bool print, cli_report *r) {
   size_t points[2], spans[2];
   for (int i = 0; i < 2; i++) {
-    points[i] = form.knot_count[i] - form.degree[i] - 1;
-    spans[i] = count_spans(&form, i);
+    points[i] = form->knot_count[i] - form->degree[i] - 1;
+    spans[i] = count_spans(form, i);
   }
-  cli_run_clear(run);
   cli_report_count(r, "dimension", 3);
-  cli_report_count(r, "degree_u", form.degree[0]);
-  cli_report_count(r, "degree_v", form.degree[1]);
+  cli_report_count(r, "degree_u", form->degree[0]);
+  cli_report_count(r, "degree_v", form->degree[1]);
   cli_report_count(r, "spans_u", spans[0]);
   cli_report_count(r, "spans_v", spans[1]);
   cli_report_count(r, "control_points", points[0] * points[1]);
-  if (print) {
-    cli_line("surface", "degree %u x %u, %zu x %zu control points, %zu x %zu spans", form.degree[0], form.degree[1],
-             points[0], points[1], spans[0], spans[1]);
-    cli_line("domain", "u %.6g .. %.6g, v %.6g .. %.6g", form.knots[0][0], form.knots[0][form.knot_count[0] - 1],
-             form.knots[1][0], form.knots[1][form.knot_count[1] - 1]);
+  if (!print) return;
+  cli_line("surface", "degree %u x %u, %zu x %zu control points, %zu x %zu spans", form->degree[0], form->degree[1],
+           points[0], points[1], spans[0], spans[1]);
+  cli_line("domain", "u %.6g .. %.6g, v %.6g .. %.6g", form->knots[0][0], form->knots[0][form->knot_count[0] - 1],
+           form->knots[1][0], form->knots[1][form->knot_count[1] - 1]);
+}
+
+static batten_status tell_surface(cli_run *run, const char *path, bool print, cli_report *r) {
+  batten_surface *surface = NULL;
+  batten_surface_measures m;
+  batten_convexity c;
+  batten_status st = batten_read_surface(run->ctx, path, &surface);
+  if (st < 0) return st;
+  st = batten_surface_measure(run->ctx, surface, &m);
+  if (st >= 0) st = batten_surface_certify_convex(run->ctx, surface, NULL, &c);
+  if (st >= 0) {
+    batten_surface_form form = batten_surface_get(surface);
+    cli_run_clear(run);
+    tell_form(&form, print, r);
+    surface_report_measures(&m, r);
+    surface_report_convexity(&c, r);
+    if (print) {
+      surface_print_measures(&m);
+      surface_print_convexity(&c);
+    }
   }
   batten_surface_free(surface);
   return st;

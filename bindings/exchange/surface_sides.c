@@ -91,9 +91,6 @@ batten_status bx_find_sides(batten_context *ctx, const batten_surface_form *form
     out->closed[1 - k] = are_same(form, k, k + 2, tolerance);
     if (out->closed[1 - k]) out->point[k + 2] = out->point[k];
   }
-  if (out->point[0] && out->point[1] && out->point[2] && out->point[3])
-    return batten_fail(ctx, BATTEN_E_INVALID,
-                       "surface: each of its four sides is one point; CAD files need an edge: split it");
   join_corners(form, tolerance, out);
   return BATTEN_OK;
 }

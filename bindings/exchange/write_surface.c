@@ -31,6 +31,20 @@ static batten_status check_options(batten_context *ctx, const batten_write_surfa
   return BATTEN_OK;
 }
 
+/* A loop that passes a vertex where two sides have vanished has nothing that tells which of the parameters' corners
+ * it goes through: Open CASCADE then makes a face of something else. */
+static batten_status check_step(batten_context *ctx, const bx_sides *sides) {
+  static const char *const names[BX_SIDES] = {"lower v", "upper u", "upper v", "lower u"};
+  for (unsigned k = 0; k < BX_SIDES; k++)
+    if (sides->point[k] && sides->point[(k + 1) % BX_SIDES])
+      return batten_fail(
+          ctx, BATTEN_E_INVALID,
+          "surface: its neighbouring sides at %s and %s are points, which STEP faces cannot have; write "
+          ".iges, or split it",
+          names[k], names[(k + 1) % BX_SIDES]);
+  return BATTEN_OK;
+}
+
 static batten_status write_cad(batten_context *ctx, const batten_surface_form *form,
                                const batten_write_surface_options *o, bx_format format, const char *path) {
   char name[BX_PRODUCT_NAME];
@@ -39,6 +53,7 @@ static batten_status write_cad(batten_context *ctx, const batten_surface_form *f
   bx_product product = product_of(o);
   bx_complete_product(&product, path, name);
   batten_status st = bx_find_sides(ctx, form, o->unit, &sides);
+  if (st == BATTEN_OK && format == BX_STEP) st = check_step(ctx, &sides);
   if (st == BATTEN_OK) st = bx_create(&w, ctx, path);
   if (st != BATTEN_OK) return st;
   if (format == BX_STEP)

@@ -21,6 +21,7 @@ static const struct {
     {"qp.json", "{\"batten\": \"qp\", \"version\": 1}", BATTEN_FILE_QP},
     {"s.json", "{\"batten\": \"qp_solution\", \"version\": 1}", BATTEN_FILE_DOCUMENT},
     {"n.json", "{\"batten\": \"network\", \"version\": 1}", BATTEN_FILE_NETWORK},
+    {"p.json", "{\"batten\": \"surface\", \"version\": 1}", BATTEN_FILE_SURFACE},
     {"a.step", "ISO-10303-21;", BATTEN_FILE_UNKNOWN},
     {"a.QPS", "NAME\n", BATTEN_FILE_QP},
     {"a.sif", "", BATTEN_FILE_QP},

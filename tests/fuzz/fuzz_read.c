@@ -115,6 +115,19 @@ static const char *read_network(bx_reader *r) {
   return wrong;
 }
 
+static const char *read_surface(bx_reader *r) {
+  batten_surface *surface = NULL;
+  batten_status st = bx_read_surface_from(r, &surface);
+  if (st != BATTEN_OK) return surface ? "a result in spite of a failure" : check_failure(r->ctx, st);
+  batten_surface_form form = batten_surface_get(surface);
+  double place[2];
+  batten_surface_point p;
+  for (int i = 0; i < 2; i++) place[i] = 0.5 * form.knots[i][0] + 0.5 * form.knots[i][form.knot_count[i] - 1];
+  st = batten_surface_evaluate(r->ctx, surface, 1, place, &p);
+  batten_surface_free(surface);
+  return st < 0 ? "a surface that cannot be evaluated" : NULL;
+}
+
 static const char *check_matrix(const batten_matrix *m, size_t n) {
   if (!m) return NULL;
   if (m->columns != n) return "a matrix of another width";
@@ -161,12 +174,13 @@ static bool read_once(bx_reader *r, bx_format format, unsigned which, const char
     return true;
   }
   if (format == BX_JSON) {
-    if (which > 4) return false;
+    if (which > 5) return false;
     *wrong = which == 0   ? load_solid(r)
              : which == 1 ? load_carrier(r)
              : which == 2 ? read_qp(r, format)
              : which == 3 ? load_qp_solution(r)
-                          : read_network(r);
+             : which == 4 ? read_network(r)
+                          : read_surface(r);
     return true;
   }
   if (which == 3 && format != BX_TEXT)

@@ -1,8 +1,11 @@
-/* STEP and IGES files of networks as Open CASCADE sees them: are the shapes valid, closed where they should be, with the
- * volume that batten measured, as many faces as it wrote, under their names, and without a kink across smooth edges?
- *   judge MANIFEST
- * A line of the manifest: FILE FACES SOLIDS VOLUME AREA NORMALS: VOLUME and AREA nan where not known, in the file's unit;
- * NORMALS the largest angle allowed across shared edges in degrees, nan where there may be kinks. TAP on stdout. */
+/* STEP and IGES files as Open CASCADE sees them. Of networks: are the shapes valid, closed where they should be, with
+ * the volume that batten measured, as many faces as it wrote, under their names, and without a kink across smooth
+ * edges? judge MANIFEST A line of the manifest: FILE FACES SOLIDS VOLUME AREA NORMALS: VOLUME and AREA nan where not
+ * known, in the file's unit; NORMALS the largest angle allowed across shared edges in degrees, nan where there may be
+ * kinks. TAP on stdout.
+ *
+ * A line "surface FILE PLACES EDGES CLOSED AREA" is one face instead, with so many different edges, closed or not:
+ * are points, normals and curvatures at the places the same, and is it the same area? */
 #include <BRepAdaptor_Surface.hxx>
 #include <BRepCheck_Analyzer.hxx>
 #include <BRepGProp.hxx>
@@ -10,6 +13,7 @@
 #include <BRep_Tool.hxx>
 #include <GProp_GProps.hxx>
 #include <Geom2d_Curve.hxx>
+#include <GeomLProp_SLProps.hxx>
 #include <Geom_Surface.hxx>
 #include <IGESControl_Reader.hxx>
 #include <Interface_Static.hxx>
@@ -22,6 +26,7 @@
 #include <TopExp.hxx>
 #include <TopExp_Explorer.hxx>
 #include <TopTools_IndexedDataMapOfShapeListOfShape.hxx>
+#include <TopTools_IndexedMapOfShape.hxx>
 #include <TopTools_ListOfShape.hxx>
 #include <TopoDS.hxx>
 #include <TransferBRep.hxx>
@@ -46,8 +51,8 @@ static void line(bool ok, const std::string &what) {
   if (!ok) failed++;
 }
 
-/* The normal of a face where its surface comes nearest to p, started from (u, v): Newton's method on the tangent plane,
- * so that the interpolated curve in parameter space does not limit the angle. */
+/* The normal of a face where its surface comes nearest to p, started from (u, v): Newton's method on the tangent
+ * plane, so that the interpolated curve in parameter space does not limit the angle. */
 static bool normal_near(const TopoDS_Face &face, const gp_Pnt &p, double u, double v, gp_Vec &normal, double &off) {
   TopLoc_Location place;
   Handle(Geom_Surface) surface = BRep_Tool::Surface(face, place);
@@ -135,6 +140,83 @@ static std::string text(double value) {
   return out;
 }
 
+/* Largest differences from what the places' file says: of points over the size, normals, curvatures over the largest.
+ */
+struct differences {
+  size_t count = 0;
+  double point = 0, normal = 0, gauss = 0, mean = 0;
+};
+
+static differences compare_places(const TopoDS_Face &face, const std::string &places) {
+  differences out;
+  TopLoc_Location place;
+  Handle(Geom_Surface) surface = BRep_Tool::Surface(face, place);
+  double u, v, x[3], n[3], gauss, mean, size = 0, gauss_largest = 0, mean_largest = 0;
+  std::ifstream in(places);
+  while (in >> u >> v >> x[0] >> x[1] >> x[2] >> n[0] >> n[1] >> n[2] >> gauss >> mean) {
+    GeomLProp_SLProps at(surface, u, v, 2, 1e-12);
+    if (!at.IsNormalDefined() || !at.IsCurvatureDefined()) return differences();
+    gp_Vec normal(at.Normal());
+    if (face.Orientation() == TopAbs_REVERSED) normal.Reverse();
+    out.count++;
+    out.point = std::fmax(out.point, at.Value().Distance(gp_Pnt(x[0], x[1], x[2])));
+    out.normal = std::fmax(out.normal, (normal - gp_Vec(n[0], n[1], n[2])).Magnitude());
+    out.gauss = std::fmax(out.gauss, std::fabs(at.GaussianCurvature() - gauss));
+    out.mean = std::fmax(out.mean, std::fabs(std::fabs(at.MeanCurvature()) - std::fabs(mean)));
+    size = std::fmax(size, gp_Vec(x[0], x[1], x[2]).Magnitude());
+    gauss_largest = std::fmax(gauss_largest, std::fabs(gauss));
+    mean_largest = std::fmax(mean_largest, std::fabs(mean));
+  }
+  out.point /= size;
+  out.gauss /= gauss_largest + 1 / size / size;
+  out.mean /= mean_largest + 1 / size;
+  return out;
+}
+
+static TopoDS_Shape read_file(const std::string &file) {
+  if (file.rfind(".step") == file.size() - 5) {
+    STEPControl_Reader reader;
+    if (reader.ReadFile(file.c_str()) != IFSelect_RetDone) return TopoDS_Shape();
+    reader.TransferRoots();
+    return reader.OneShape();
+  }
+  IGESControl_Reader reader;
+  if (reader.ReadFile(file.c_str()) != IFSelect_RetDone) return TopoDS_Shape();
+  reader.TransferRoots();
+  return reader.OneShape();
+}
+
+static void judge_surface(const std::string &file, const std::string &places, size_t edges, bool closed,
+                          double area) {
+  const std::string name = file.substr(file.rfind('/') + 1) + ": ";
+  TopoDS_Shape shape = read_file(file);
+  if (shape.IsNull()) return line(false, name + "cannot be read");
+  line(BRepCheck_Analyzer(shape).IsValid(), name + "valid");
+  size_t faces = count_shapes(shape, TopAbs_FACE);
+  line(faces == 1, name + std::to_string(faces) + " faces of 1");
+  if (faces != 1) return;
+  TopTools_IndexedMapOfShape map;
+  TopExp::MapShapes(shape, TopAbs_EDGE, map);
+  size_t have = 0;
+  bool free_edges = false;
+  for (int i = 1; i <= map.Extent(); i++) {
+    const TopoDS_Edge &edge = TopoDS::Edge(map(i));
+    if (BRep_Tool::Degenerated(edge)) continue;
+    have++;
+    free_edges =
+        free_edges || !BRep_Tool::IsClosed(edge, TopoDS::Face(TopExp_Explorer(shape, TopAbs_FACE).Current()));
+  }
+  line(have == edges && free_edges == !closed, name + std::to_string(have) + " edges of " + std::to_string(edges));
+  differences d = compare_places(TopoDS::Face(TopExp_Explorer(shape, TopAbs_FACE).Current()), places);
+  line(d.count > 100 && d.point <= 1e-14 && d.normal <= 1e-11 && d.gauss <= 1e-9 && d.mean <= 1e-9,
+       name + std::to_string(d.count) + " places: points within " + text(d.point) + ", normals " + text(d.normal) +
+           ", curvatures " + text(d.gauss) + ", " + text(d.mean));
+  GProp_GProps props;
+  BRepGProp::SurfaceProperties(shape, props, 1e-10);
+  double off = std::fabs(props.Mass() - area) / area;
+  line(off <= 1e-7, name + "area " + text(props.Mass()) + ", off by " + text(off));
+}
+
 static void judge(const std::string &file, size_t faces, size_t solids, double volume, double area, double normals) {
   bool step = file.size() > 5 && (file.rfind(".step") == file.size() - 5 || file.rfind(".stp") == file.size() - 4);
   TopoDS_Shape shape;
@@ -190,6 +272,14 @@ int main(int argc, char **argv) {
   std::string row;
   while (std::getline(manifest, row)) {
     std::istringstream in(row);
+    if (row.compare(0, 8, "surface ") == 0) {
+      std::string word, surface, places, area;
+      size_t edges;
+      bool closed;
+      in >> word >> surface >> places >> edges >> closed >> area;
+      judge_surface(surface, places, edges, closed, std::strtod(area.c_str(), nullptr));
+      continue;
+    }
     std::string file, volume, area, normals;
     size_t faces, solids;
     in >> file >> faces >> solids >> volume >> area >> normals;

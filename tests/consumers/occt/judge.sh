@@ -1,8 +1,7 @@
 #!/bin/sh
 # Has Open CASCADE read what batten writes: compiles judge.cpp, lets FILES write into a scratch folder, and judges that.
-#   judge.sh FILES        environment: SOURCE (root of batten), CXX; OCCT_INCLUDE where its headers are not Debian's
+#   judge.sh FILES...     environment: SOURCE (root of batten), CXX; OCCT_INCLUDE where its headers are not Debian's
 set -eu
-files=$1
 include=${OCCT_INCLUDE:-/usr/include/opencascade}
 skip() {
   echo "1..0 # SKIP $1"
@@ -16,5 +15,5 @@ trap 'rm -rf "$scratch"' EXIT
 $cxx -std=c++17 -O1 -Wall -isystem "$include" "$SOURCE/tests/consumers/occt/judge.cpp" -o "$scratch/judge" \
   -lTKSTEP -lTKSTEPBase -lTKSTEPAttr -lTKIGES -lTKXSBase -lTKShHealing -lTKTopAlgo -lTKBRep -lTKGeomAlgo \
   -lTKGeomBase -lTKG3d -lTKG2d -lTKMath -lTKernel
-"$files" "$scratch" >"$scratch/manifest"
+for files; do "$files" "$scratch"; done >"$scratch/manifest"
 "$scratch/judge" "$scratch/manifest"

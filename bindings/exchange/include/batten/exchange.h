@@ -196,8 +196,8 @@ BATTEN_API batten_write_surface_options batten_write_surface_options_default(voi
  *   .json       {"batten": "surface", "version": 1, ...}; reads back to the same bits
  *   .vtu        Bezier quadrilaterals of VTK 9, one a span pair, exact; cell data "domain": u_0, u_1, v_0, v_1
  *   .ply .obj .off .stl .vtp   tessellated, see batten_surface_tessellate
- * Fails: IO, INVALID (unknown extension: lists the known; STEP and IGES: the control points span no area, or all four
- * sides are points), TOO_LARGE, NOMEM, CANCELLED; what stood under the name is then as it was. */
+ * Fails: IO, INVALID (unknown extension: lists the known; STEP and IGES: the control points span no area; STEP: two
+ * neighbouring sides are points), TOO_LARGE, NOMEM, CANCELLED; what stood under the name is then as it was. */
 BATTEN_API batten_status batten_write_surface(batten_context *ctx, const batten_surface *surface,
                                               const batten_write_surface_options *opt, const char *path);
 
