@@ -21,34 +21,6 @@ typedef struct search {
   unsigned depth[DEPTH + 2];
 } search;
 
-/* The largest difference of neighbours in u and in v. */
-static bool u_differs_more(const search *s, const double *net) {
-  double u = 0, v = 0;
-  size_t row = s->q + 1;
-  for (size_t i = 0; i <= s->p; i++)
-    for (size_t j = 0; j <= s->q; j++) {
-      const double *b = net + i * row + j;
-      if (i < s->p) u = fmax(u, fabs(b[row] - b[0]));
-      if (j < s->q) v = fmax(v, fabs(b[1] - b[0]));
-    }
-  return u >= v;
-}
-
-/* The halves of a net, by u or by v: de Casteljau's algorithm with stride. left holds the whole at first. */
-static void halve(const search *s, bool by_u, double *left, double *right) {
-  size_t row = s->q + 1, lines = by_u ? row : s->p + 1, step = by_u ? row : 1, next = by_u ? 1 : row;
-  unsigned degree = by_u ? s->p : s->q;
-  memcpy(right, left, (s->p + 1) * row * sizeof *left);
-  for (size_t l = 0; l < lines; l++) {
-    double *a = left + l * next, *b = right + l * next;
-    for (unsigned level = 0; level < degree; level++) {
-      a[level * step] = b[0];
-      for (unsigned k = 0; k < degree - level; k++) b[k * step] = 0.5 * (b[k * step] + b[(k + 1) * step]);
-    }
-    a[degree * step] = b[0];
-  }
-}
-
 static double largest_coefficient(const search *s, const double *net) {
   double most = net[0];
   for (size_t i = 1; i < (s->p + 1) * (size_t)(s->q + 1); i++) most = fmax(most, net[i]);
@@ -74,7 +46,7 @@ static double bound(search *s) {
       most = fmax(most, above);
       continue;
     }
-    halve(s, u_differs_more(s, top), top, top + NET);
+    surface_net_halve(s->p, s->q, 1, surface_net_longer_in_u(s->p, s->q, 1, top), top, top + NET);
     s->depth[height] = s->depth[height + 1] = depth + 1;
     height += 2;
   }

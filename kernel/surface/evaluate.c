@@ -58,12 +58,9 @@ void surface_basis_make(const bspline *b, size_t mu, double t, surface_basis *ou
 
 /* ---- a place ------------------------------------------------------------------------------------ */
 
-void surface_jet_scaled(const batten_surface *surface, const surface_basis *u, const surface_basis *v,
-                        double (*jet)[3]) {
-  unsigned p = surface->space[0].degree, q = surface->space[1].degree, columns = 3 * (q + 1);
-  size_t stride = 3 * surface->space[1].count;
-  const double *row = surface->control_points + u->first * stride + 3 * v->first;
-  double unit = ldexp(1, surface->exponent);
+void surface_net_jet(unsigned p, unsigned q, size_t stride, const double *row, double unit, const surface_basis *u,
+                     const surface_basis *v, double (*jet)[3]) {
+  unsigned columns = 3 * (q + 1);
   /* Along u first: the point, its differences by v, its derivatives by u. */
   double point[3 * BSPLINE_ORDER] = {0}, across[3 * BSPLINE_ORDER] = {0}, first[3 * BSPLINE_ORDER] = {0},
                    second[3 * BSPLINE_ORDER] = {0};
@@ -92,6 +89,13 @@ void surface_jet_scaled(const batten_surface *surface, const surface_basis *u, c
       jet[5][d] += v->bend[j] * across[3 * j + d];
       jet[4][d] += v->slope[j] * (first[3 * j + 3 + d] - first[3 * j + d]);
     }
+}
+
+void surface_jet_scaled(const batten_surface *surface, const surface_basis *u, const surface_basis *v,
+                        double (*jet)[3]) {
+  size_t stride = 3 * surface->space[1].count;
+  surface_net_jet(surface->space[0].degree, surface->space[1].degree, stride,
+                  surface->control_points + u->first * stride + 3 * v->first, ldexp(1, surface->exponent), u, v, jet);
 }
 
 /* out = from 2^exponent, also where that power is no double. */

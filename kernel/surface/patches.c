@@ -48,3 +48,29 @@ void surface_patch_net(const batten_surface *surface, const surface_axis axis[2]
     }
   }
 }
+
+void surface_net_halve(unsigned p, unsigned q, unsigned dim, bool by_u, double *left, double *right) {
+  /* de Casteljau's algorithm along all lines at once: `lines` numbers, then those `step` further. */
+  size_t row = (q + 1) * (size_t)dim, step = by_u ? row : dim, blocks = by_u ? 1 : p + 1;
+  unsigned degree = by_u ? p : q;
+  memcpy(right, left, (p + 1) * row * sizeof *left);
+  for (size_t block = 0; block < blocks; block++) {
+    double *a = left + block * row, *b = right + block * row;
+    for (unsigned level = 0; level <= degree; level++) {
+      memcpy(a + level * step, b, step * sizeof *a);
+      for (size_t x = 0; x < (degree - level) * step; x++) b[x] = 0.5 * (b[x] + b[x + step]);
+    }
+  }
+}
+
+bool surface_net_longer_in_u(unsigned p, unsigned q, unsigned dim, const double *net) {
+  double u = 0, v = 0;
+  size_t row = (q + 1) * (size_t)dim;
+  for (size_t i = 0; i <= p; i++)
+    for (size_t x = 0; x < row; x++) {
+      const double *b = net + i * row + x;
+      if (i < p) u = fmax(u, fabs(b[row] - b[0]));
+      if (x + dim < row) v = fmax(v, fabs(b[dim] - b[0]));
+    }
+  return u >= v;
+}

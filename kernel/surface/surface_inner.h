@@ -10,6 +10,7 @@
 #define BATTEN_SURFACE_INNER_H
 
 #include <batten/surface.h>
+#include <stdbool.h>
 
 #include "basis/bspline.h"
 
@@ -41,6 +42,10 @@ void surface_basis_make(const bspline *space, size_t mu, double t, surface_basis
  * this jet are those of the surface over that factor. */
 void surface_jet_scaled(const batten_surface *surface, const surface_basis *u, const surface_basis *v,
                         double (*jet)[3]);
+/* The same of the control points that count, `row` their first; rows along v are `stride` numbers apart. Derivatives
+ * are times unit. */
+void surface_net_jet(unsigned p, unsigned q, size_t stride, const double *row, double unit, const surface_basis *u,
+                     const surface_basis *v, double (*jet)[3]);
 void surface_point_make(const batten_surface *surface, const surface_basis *u, const surface_basis *v,
                         batten_surface_point *out);
 
@@ -67,6 +72,10 @@ void surface_axis_free(batten_context *ctx, surface_axis *axis);
 /* The Bezier net [degree 0 + 1][degree 1 + 1][3] of span pair (i, j), 2^exponent (b - origin). */
 void surface_patch_net(const batten_surface *surface, const surface_axis axis[2], size_t i, size_t j,
                        const double origin[3], int exponent, double (*net)[3]);
+/* The halves of a net [p + 1][q + 1][dim] by u, or by v; left holds the whole at first. */
+void surface_net_halve(unsigned p, unsigned q, unsigned dim, bool by_u, double *left, double *right);
+/* True when neighbours in u differ by more than those in v. */
+bool surface_net_longer_in_u(unsigned p, unsigned q, unsigned dim, const double *net);
 
 /* ---- extremes.c, box.c: for measure.c ------------------------------------------------------------ */
 
