@@ -108,7 +108,7 @@ typedef struct picture_view {
   batten_picture_options o; /* checked; width and height are the rectangle's */
   unsigned group;           /* views of one camera; 0 = by itself */
   size_t x0, y0;            /* of the rectangle in the whole */
-  double unit;              /* height of lettering */
+  double unit, left;        /* height of lettering, and where titles begin */
   picture_ball ball;
   picture_scene scene;
   picture_camera camera;
@@ -150,7 +150,7 @@ batten_status picture_shade(batten_context *ctx, const picture_scene *scene, con
 
 /* ---- lettering beside and about it ---- */
 double picture_title_room(const batten_picture_options *o, double unit); /* at the top, pixels; 0 without a title */
-void picture_draw_title(picture_image *image, const batten_picture_options *o, double unit);
+void picture_draw_title(picture_image *image, const batten_picture_options *o, double unit, double left);
 bool picture_has_color_bar(const batten_picture_options *o);
 double picture_color_bar_room(const batten_picture_options *o, double unit); /* on the right */
 void picture_draw_color_bar(picture_image *image, const batten_picture_options *o, double unit);

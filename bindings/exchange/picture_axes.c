@@ -147,7 +147,7 @@ void picture_draw_axes(picture_image *image, const picture_view *view, const pic
   for (unsigned k = 0; k < 3; k++) {
     unsigned c = coordinate(&w, k);
     edges[k] = find_edge(&w, k);
-    unsigned wanted = (unsigned)fmin(6, fmax(1, edges[k].length / (3.2 * view->unit)));
+    unsigned wanted = (unsigned)fmin(6, fmax(1, edges[k].length / (4 * view->unit)));
     w.ticks[k] = picture_ticks_choose(a->from[c], a->to[c], wanted);
   }
   draw_walls(&w);

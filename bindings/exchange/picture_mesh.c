@@ -17,6 +17,9 @@ static double lettering(double width, double height, double whole_width, double 
   return fmax(7, sqrt(whole * part) / 52);
 }
 
+/* Where a title begins, in heights of the whole picture's lettering: panels below each other in line with it. */
+static const double title_left = 1.8;
+
 /* Pixels of a line's width; 1.6 thousandths unless said otherwise. In small pictures lines stay as they are in one of
  * 364 pixels. */
 static double line_width(const batten_picture_lines *l, const picture_image *im) {
@@ -49,7 +52,7 @@ static batten_status draw_view(batten_context *ctx, const picture_view *v, pictu
   if (v->o.axes) picture_draw_axes(image, v, &buffer);
   draw_lines(v, &buffer, image);
   if (picture_has_color_bar(&v->o)) picture_draw_color_bar(image, &v->o, v->unit);
-  picture_draw_title(image, &v->o, v->unit);
+  picture_draw_title(image, &v->o, v->unit, v->left);
 done:
   batten_free(ctx, buffer.screen);
   batten_free(ctx, buffer.item);
@@ -74,6 +77,7 @@ batten_status batten_picture_mesh(batten_context *ctx, const batten_mesh *mesh, 
   st = picture_check_mesh(ctx, &view, name);
   if (st < 0) return st;
   view.unit = lettering(view.o.width, view.o.height, view.o.width, view.o.height);
+  view.left = title_left * view.unit;
   st = picture_views_make(ctx, 1, &view);
   if (st >= 0) st = picture_image_new(ctx, view.o.width, view.o.height, &image);
   if (st >= 0) st = draw_view(ctx, &view, &image);
@@ -105,7 +109,8 @@ static batten_status take_panel(batten_context *ctx, const batten_picture_panel 
 static batten_status take_panels(batten_context *ctx, unsigned rows, unsigned columns,
                                  const batten_picture_panel *panels, const batten_picture_options *o,
                                  picture_view *views) {
-  size_t top = (size_t)ceil(picture_title_room(o, lettering(o->width, o->height, o->width, o->height)));
+  double unit = lettering(o->width, o->height, o->width, o->height);
+  size_t top = (size_t)ceil(picture_title_room(o, unit));
   size_t width = o->width / columns, height = o->height > top ? (o->height - top) / rows : 0;
   if (width < PICTURE_SIDE_MIN || height < PICTURE_SIDE_MIN)
     return batten_fail(ctx, BATTEN_E_INVALID,
@@ -116,6 +121,7 @@ static batten_status take_panels(batten_context *ctx, unsigned rows, unsigned co
     *v = (picture_view){.x0 = i % columns * width, .y0 = top + i / columns * height};
     v->o.width = (unsigned)width;
     v->o.height = (unsigned)height;
+    v->left = title_left * unit;
     v->unit = lettering((double)width, (double)height, o->width, o->height);
     if (!panels[i].mesh) continue;
     char name[32];
@@ -180,7 +186,8 @@ batten_status batten_picture_panels(batten_context *ctx, unsigned rows, unsigned
   for (size_t i = 0; st >= 0 && i < count; i++)
     if (views[i].mesh) st = draw_panel(ctx, &views[i], &image);
   if (st < 0) goto done;
-  picture_draw_title(&image, &o, lettering(o.width, o.height, o.width, o.height));
+  double unit = lettering(o.width, o.height, o.width, o.height);
+  picture_draw_title(&image, &o, unit, title_left * unit);
   st = picture_write_png(ctx, &image, path);
 done:
   picture_image_free(ctx, &image);
