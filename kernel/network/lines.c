@@ -7,6 +7,7 @@
 #include <batten/network.h>
 
 #include "base/checked.h"
+#include "mesh/levels.h"
 #include "mesh/vec.h"
 
 #include <string.h>
@@ -114,38 +115,13 @@ static bool unwrap(const light *l, const double *values, const uint32_t *corners
   return l->kind == BATTEN_LINES_ISOPHOTE || fabs(out[1] - out[2]) <= 0.5 * l->count;
 }
 
-/* Where an edge passes the level, from its lower vertex on: the same bits for both of its triangles, but for the
+/* Segments of one triangle; out NULL: only their number. Ends on an edge agree for both of its triangles but for the
  * rounding of unwrapped values. */
-static void crossing(const double *vertices, uint32_t a, uint32_t b, double va, double vb, double level,
-                     double out[3]) {
-  if (a > b) {
-    uint32_t vertex = a;
-    double value = va;
-    a = b;
-    b = vertex;
-    va = vb;
-    vb = value;
-  }
-  double t = (level - va) / (vb - va);
-  const double *p = vertices + 3 * (size_t)a, *q = vertices + 3 * (size_t)b;
-  for (int d = 0; d < 3; d++) out[d] = p[d] + t * (q[d] - p[d]);
-}
-
-/* Segments of one triangle; out NULL: only their number. The side where values are larger is on their left. */
 static size_t cut_triangle(const double *vertices, const uint32_t *corners, const double v[3], double (*out)[2][3]) {
   double least = fmin(v[0], fmin(v[1], v[2])), most = fmax(v[0], fmax(v[1], v[2]));
   size_t count = 0;
-  for (double level = floor(least - 0.5) + 0.5; level <= most; level += 1) {
-    bool above[3] = {v[0] >= level, v[1] >= level, v[2] >= level};
-    if (above[0] == above[1] && above[1] == above[2]) continue;
-    if (out)
-      for (int k = 0; k < 3; k++) {
-        int next = (k + 1) % 3;
-        if (above[k] == above[next]) continue;
-        crossing(vertices, corners[k], corners[next], v[k], v[next], level, out[count][above[k] ? 0 : 1]);
-      }
-    count++;
-  }
+  for (double level = floor(least - 0.5) + 0.5; level <= most; level += 1)
+    if (levels_cut(vertices, corners, v, level, out ? out[count] : NULL)) count++;
   return count;
 }
 
