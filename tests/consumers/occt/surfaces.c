@@ -4,6 +4,7 @@
 
 #include <stdio.h>
 
+#include "surface_places.h"
 #include "surface_sides.h"
 
 typedef struct batch {
@@ -17,28 +18,6 @@ static bool done(batch *b, batten_status st, const char *what) {
   fprintf(stderr, "%s: %s: %s\n", what, batten_status_name(st), batten_error(b->ctx));
   b->failed = true;
   return false;
-}
-
-/* A line a place: u v, point, normal, Gaussian and mean curvature. Lengths times scale. */
-static bool write_places(batch *b, const batten_surface *surface, double scale, const char *path) {
-  enum { STEPS = 11 };
-  batten_surface_form form = batten_surface_get(surface);
-  FILE *file = fopen(path, "w");
-  if (!file) return false;
-  for (int i = 0; i <= STEPS; i++)
-    for (int j = 0; j <= STEPS; j++) {
-      double at[2];
-      batten_surface_point p;
-      for (int k = 0; k < 2; k++) {
-        double from = form.knots[k][0], to = form.knots[k][form.knot_count[k] - 1];
-        at[k] = from + (to - from) * (0.01 + 0.98 * (k ? j : i) / STEPS); /* not at poles and seams */
-      }
-      if (!done(b, batten_surface_evaluate(b->ctx, surface, 1, at, &p), path)) break;
-      fprintf(file, "%.17g %.17g %.17g %.17g %.17g %.17g %.17g %.17g %.17g %.17g\n", at[0], at[1], scale * p.point[0],
-              scale * p.point[1], scale * p.point[2], p.normal[0], p.normal[1], p.normal[2], p.gauss / scale / scale,
-              p.mean / scale);
-    }
-  return fclose(file) == 0;
 }
 
 static void write_files(batch *b, const surface_side_case *shape) {
@@ -57,7 +36,7 @@ static void write_files(batch *b, const surface_side_case *shape) {
       snprintf(places, sizeof places, "%s.places", path);
       if (shape->iges_only && i % 2 == 0) continue;
       if (!done(b, batten_write_surface(b->ctx, surface, &o, path), path)) break;
-      if (!write_places(b, surface, scale, places)) b->failed = true;
+      if (!surface_places_write(b->ctx, surface, scale, places)) b->failed = true;
       printf("surface %s %s %u %d %.17g\n", path, places, shape->edges, shape->uses == 2 * shape->edges,
              scale * scale * m.area);
     }
