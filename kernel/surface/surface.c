@@ -11,9 +11,10 @@ static batten_status check_axis(batten_context *ctx, const batten_surface_form *
     return batten_fail(ctx, BATTEN_E_INVALID, "degree[%d]: %u; give 1 to %d", i, d, BATTEN_SURFACE_DEGREE_MAX);
   size_t n = form->knot_count[i];
   const double *knots = form->knots[i];
-  if (n < 2 * (size_t)(d + 1) || !knots)
+  if (n < 2 * (size_t)(d + 1))
     return batten_fail(ctx, BATTEN_E_INVALID, "knot_count[%d]: %zu; degree %u needs %u knots at least", i, n, d,
                        2 * (d + 1));
+  if (!knots) return batten_fail(ctx, BATTEN_E_INVALID, "knots[%d]: NULL; give %zu", i, n);
   size_t bad = batten_first_nonfinite(n, knots);
   if (bad < n) return batten_fail(ctx, BATTEN_E_INVALID, "knots[%d][%zu]: %g; give finite knots", i, bad, knots[bad]);
   *count = n - d - 1;
@@ -21,6 +22,8 @@ static batten_status check_axis(batten_context *ctx, const batten_surface_form *
     if (knots[k] > knots[k + 1])
       return batten_fail(ctx, BATTEN_E_INVALID, "knots[%d][%zu]: %.17g is below the knot before it; sort them", i,
                          k + 1, knots[k + 1]);
+  if (knots[0] == knots[n - 1])
+    return batten_fail(ctx, BATTEN_E_INVALID, "knots[%d]: all are %.17g; give a domain of some length", i, knots[0]);
   for (size_t k = 1; k < n; k++) {
     bool end = k <= d || k > *count;
     bool equal = knots[k] == knots[k - 1];
@@ -28,7 +31,8 @@ static batten_status check_axis(batten_context *ctx, const batten_surface_form *
       return batten_fail(ctx, BATTEN_E_INVALID,
                          "knots[%d][%zu]: %.17g; the first and the last %u knots of degree %u must be equal", i, k,
                          knots[k], d + 1, d);
-    if (!end && k >= d && knots[k] == knots[k - d])
+    /* One inner knot at the upper end is one too many; those at the lower one repeat the first d + 1. */
+    if (!end && k >= d && (knots[k] == knots[k - d] || (k == *count && equal)))
       return batten_fail(ctx, BATTEN_E_INVALID,
                          "knots[%d][%zu]: %.17g repeats too often; inner knots may be there %u times", i, k, knots[k],
                          d);

@@ -56,7 +56,8 @@ static void bound_second(unsigned p, unsigned q, const double (*net)[3], double 
 
 /* bound over 4 tolerances, so that a direction alone needs its root many segments. */
 static void count_segments(const double bound[3], double steps[2]) {
-  double uu = bound[0], uv = bound[1], vv = bound[2], r = uu == vv ? 1 : sqrt(uu / vv);
+  double uu = bound[0], uv = bound[1], vv = bound[2], r = 1;
+  if (uv > 0 && uu != vv) r = sqrt((uu + uv / 8) / (vv + uv / 8));
   /* The share of M_uv that fills up a direction's one segment costs it nothing. */
   if (uv > 0 && vv < 1) r = fmin(r, uv / (1 - vv));
   if (uv > 0 && uu < 1) r = fmax(r, (1 - uu) / uv);
