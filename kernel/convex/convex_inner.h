@@ -108,6 +108,10 @@ typedef struct convex_reference {
   bool whole;      /* already w_least does: it is the best fit, and needs no inequalities */
 } convex_reference;
 
+/* Whether the generator of inequalities takes a surface for strictly convex. Fails: NOMEM, CANCELLED. */
+batten_status convex_is_convex(batten_context *ctx, const convex_space *space, const double *control,
+                               const convex_row_options *rows, bool *convex);
+
 /* Binary search for the least w, not below w_least, whose surface the generator of inequalities takes for convex.
  * Fails: SINGULAR, NOMEM, CANCELLED. */
 batten_status convex_reference_find(batten_context *ctx, const convex_objective *o, const convex_space *space,
