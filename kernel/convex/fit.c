@@ -415,8 +415,8 @@ static batten_status run(fit *f) {
 static batten_status judge(fit *f) {
   const double *at = f->info.convexity.worst_at;
   convex_verdict v;
-  batten_status st = convex_judge(f->ctx, &f->space, f->count, f->points, f->weights, f->opt->correction_passes > 0,
-                                  &f->convex, &f->unconstrained, &v);
+  batten_status st =
+      convex_judge(f->ctx, &f->space, f->count, f->points, f->weights, &f->convex, &f->unconstrained, &v);
   if (st < 0) return st;
   f->info.misfit = v.misfit;
   if (f->info.plane)

@@ -20,7 +20,7 @@ typedef struct convex_program {
   size_t *starts;  /* compressed rows */
   uint32_t *indices;
   double *values;
-  double *point; /* [6 n] the start, and the result */
+  double *point; /* [3 n] */
 } convex_program;
 batten_status convex_program_new(batten_context *ctx, const convex_space *space, convex_program *out);
 void convex_program_free(batten_context *ctx, convex_program *p);
@@ -47,7 +47,7 @@ typedef struct convex_verdict {
   size_t neighbours; /* points of the dent */
 } convex_verdict;
 batten_status convex_judge(batten_context *ctx, const convex_space *space, size_t count, const double *points,
-                           const double *weights, bool corrected, const convex_track *convex,
-                           const convex_track *free, convex_verdict *out);
+                           const double *weights, const convex_track *convex, const convex_track *free,
+                           convex_verdict *out);
 
 #endif
