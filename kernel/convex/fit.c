@@ -13,6 +13,7 @@
 #include "mesh/vec.h"
 #include "plane.h"
 
+#include <float.h>
 #include <string.h>
 
 typedef struct fit {
@@ -359,7 +360,8 @@ static batten_status certify(fit *f, const batten_surface *convex, const batten_
 static batten_status fit_plane(fit *f) {
   size_t nu = f->space.axis[0].count, nv = f->space.axis[1].count;
   double size[2], axes[2][3], mean[3] = {0, 0, 0}, flat[2] = {0, 0};
-  batten_status st = convex_plane_project(f->ctx, f->count, f->points, f->parameters, size, axes);
+  const convex_scale as_they_are = {.scale = 1, .unit = 1, .rounding = DBL_EPSILON};
+  batten_status st = convex_plane_project(f->ctx, f->count, f->points, &as_they_are, f->parameters, size, axes);
   if (st < 0) return st;
   for (size_t i = 0; i < f->count; i++) {
     double weight = (f->weights ? f->weights[i] : 1) / f->total;
