@@ -215,42 +215,84 @@ void convex_disc_split(convex_disc *d, uint32_t h) {
   d->leaving[m] = h_far;
 }
 
-batten_status convex_disc_peel(batten_context *ctx, convex_disc *d,
-                               bool (*take)(const void *arg, const convex_disc *disc, uint32_t h), const void *arg) {
-  /* Each half-edge comes to the rim once. */
-  uint32_t *stack = batten_alloc_array(ctx, 3 * d->triangles, sizeof *stack);
-  unsigned char *gone = stack ? batten_alloc_array(ctx, d->triangles, 1) : NULL;
-  size_t height = 0, kept = 0;
-  batten_status st = gone ? BATTEN_OK : BATTEN_E_NOMEM;
-  if (st < 0) goto done;
-  memset(gone, 0, d->triangles);
-  for (size_t i = d->rim_count; i-- > 0;) stack[height++] = d->leaving[d->rim[i]];
+typedef struct peeling {
+  uint32_t *stack; /* [3 F]: each half-edge comes to the rim once */
+  uint32_t *taken; /* [F] half-edges at which triangles of the pocket went */
+  uint32_t *apexes;
+  unsigned char *gone; /* [F] */
+} peeling;
+
+/* Takes the triangle of the rim's half-edge h: start -> apex -> end are on the rim in its place. */
+static void take_off(convex_disc *d, uint32_t h, uint32_t *left, uint32_t *right) {
+  *right = d->twin[mesh_next(h)];
+  *left = d->twin[mesh_previous(h)];
+  d->twin[*right] = d->twin[*left] = MESH_NONE;
+  d->leaving[d->corners[*left]] = *left;
+  d->leaving[d->corners[mesh_previous(h)]] = *right;
+}
+
+static void put_back(convex_disc *d, uint32_t h) {
+  uint32_t right = d->twin[mesh_next(h)], left = d->twin[mesh_previous(h)]; /* the triangle still knows them */
+  d->twin[right] = mesh_next(h);
+  d->twin[left] = mesh_previous(h);
+  d->leaving[d->corners[left]] = h;
+  d->leaving[d->corners[right]] = right; /* the apex: inside again */
+}
+
+static void peel_pocket(convex_disc *d, const convex_peel *peel, uint32_t from, peeling *p) {
+  size_t height = 0, count = 0;
+  uint32_t a = d->corners[from], b = d->corners[mesh_next(from)];
+  p->stack[height++] = from;
   while (height > 0) {
-    uint32_t h = stack[--height], apex = d->corners[mesh_previous(h)];
-    if (convex_disc_is_rim(d, apex) || !take(arg, d, h)) continue;
-    uint32_t right = d->twin[mesh_next(h)], left = d->twin[mesh_previous(h)]; /* apex -> end, start -> apex */
-    gone[h / 3] = 1;
-    d->twin[right] = d->twin[left] = MESH_NONE;
-    d->leaving[d->corners[left]] = left;
-    d->leaving[apex] = right;
-    stack[height++] = left;
-    stack[height++] = right;
+    uint32_t h = p->stack[--height], apex = d->corners[mesh_previous(h)];
+    if (convex_disc_is_rim(d, apex) || !peel->take(peel->arg, d, h)) continue;
+    p->taken[count] = h;
+    p->apexes[count++] = apex;
+    take_off(d, h, p->stack + height, p->stack + height + 1);
+    height += 2;
   }
+  if (count == 0) return;
+  bool agreed = !peel->confirm || peel->confirm(peel->arg, a, b, count, p->apexes);
+  while (count-- > 0) {
+    p->gone[p->taken[count] / 3] = agreed;
+    if (!agreed) put_back(d, p->taken[count]);
+  }
+}
+
+/* Numbers the triangles that are left anew. name [3 F] is scratch. */
+static void close_ranks(convex_disc *d, const unsigned char *gone, uint32_t *name) {
+  size_t kept = 0;
   for (size_t t = 0; t < d->triangles; t++) {
     if (gone[t]) continue;
-    if (kept != t) memcpy(d->corners + 3 * kept, d->corners + 3 * t, 3 * sizeof *d->corners);
-    for (size_t k = 0; k < 3; k++) stack[3 * t + k] = (uint32_t)(3 * kept + k); /* the new number of a half-edge */
-    for (size_t k = 0; k < 3; k++) d->twin[3 * kept + k] = d->twin[3 * t + k];
+    for (size_t k = 0; k < 3; k++) {
+      name[3 * t + k] = (uint32_t)(3 * kept + k);
+      d->corners[3 * kept + k] = d->corners[3 * t + k];
+      d->twin[3 * kept + k] = d->twin[3 * t + k];
+    }
     kept++;
   }
   d->triangles = kept;
   for (size_t h = 0; h < 3 * kept; h++)
-    if (d->twin[h] != MESH_NONE) d->twin[h] = stack[d->twin[h]];
-  find_leaving(d);
-  st = find_rim(ctx, d);
+    if (d->twin[h] != MESH_NONE) d->twin[h] = name[d->twin[h]];
+}
 
-done:
-  batten_free(ctx, gone);
-  batten_free(ctx, stack);
+batten_status convex_disc_peel(batten_context *ctx, convex_disc *d, const convex_peel *peel) {
+  peeling p = {0};
+  p.stack = batten_alloc_array(ctx, 3 * d->triangles, sizeof *p.stack);
+  p.taken = p.stack ? batten_alloc_array(ctx, d->triangles, sizeof *p.taken) : NULL;
+  p.apexes = p.taken ? batten_alloc_array(ctx, d->triangles, sizeof *p.apexes) : NULL;
+  p.gone = p.apexes ? batten_alloc_array(ctx, d->triangles, 1) : NULL;
+  batten_status st = p.gone ? BATTEN_OK : BATTEN_E_NOMEM;
+  if (st >= 0) {
+    memset(p.gone, 0, d->triangles);
+    for (size_t i = 0; i < d->rim_count; i++) peel_pocket(d, peel, d->leaving[d->rim[i]], &p);
+    close_ranks(d, p.gone, p.stack);
+    find_leaving(d);
+    st = find_rim(ctx, d);
+  }
+  batten_free(ctx, p.gone);
+  batten_free(ctx, p.apexes);
+  batten_free(ctx, p.taken);
+  batten_free(ctx, p.stack);
   return st;
 }

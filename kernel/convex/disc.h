@@ -36,9 +36,14 @@ static inline uint32_t convex_disc_turn(const convex_disc *d, uint32_t h) { retu
 /* Puts a new point, disc->points, on the edge of half-edge h, which is not of the rim: two triangles become four. */
 void convex_disc_split(convex_disc *disc, uint32_t h);
 
-/* Takes triangles off the rim, each time that which take(arg, disc, h), h its half-edge on the rim, says, as long as
- * their third point is not on the rim. */
-batten_status convex_disc_peel(batten_context *ctx, convex_disc *disc,
-                               bool (*take)(const void *arg, const convex_disc *disc, uint32_t h), const void *arg);
+/* Which triangles convex_disc_peel takes off the rim: the one of half-edge h on the rim, if take says so and its
+ * third point is not on the rim; then those behind it. What goes behind one half-edge of the first rim, from point a
+ * to b, is a pocket with the third points apexes [count]; it stays whole unless confirm agrees. */
+typedef struct convex_peel {
+  const void *arg;
+  bool (*take)(const void *arg, const convex_disc *disc, uint32_t h);
+  bool (*confirm)(const void *arg, uint32_t a, uint32_t b, size_t count, const uint32_t *apexes); /* NULL: always */
+} convex_peel;
+batten_status convex_disc_peel(batten_context *ctx, convex_disc *disc, const convex_peel *peel);
 
 #endif

@@ -15,7 +15,6 @@
 #include <string.h>
 
 #include "base/checked.h"
-#include "basis/sort_points.h"
 #include "disc.h"
 #include "mesh/delaunay.h"
 #include "mesh/predicates.h"
@@ -25,57 +24,105 @@
 
 /* ---- the triangulation ---------------------------------------------------------------------------- */
 
-/* A triangle at the rim covers a gap of the data when the circle in it is 4 times as large as in 90 % of all. */
-static const double GAP_QUANTILE = 0.9, GAP_FACTOR = 4;
+/* Delaunay fills the hull. What is none of the data's is taken off its rim: pockets behind rim edges that are more
+ * than 4 times as long as what is usual at both ends, where these are also more than 4 times as deep. Shallow ones
+ * stay: along the side of a rectangle of random points the hull has few of them, and the rest are rightly inside. */
+static const double GAP_FACTOR = 4;
 
-/* One that is lower than this many roundings of the coordinates has its third point on the rim. 64: the plane adds
- * some 20 to those of the points. */
+/* Triangles that are lower than this many roundings of the coordinates have their third point on the rim. 64: the
+ * plane adds some 20 to those of the points. */
 static const double FLAT_ROUNDINGS = 64;
 
 typedef struct rim_rule {
   const double *flat;
-  double radius, height;
+  const double *usual; /* [points] distance to others */
+  double height;
 } rim_rule;
-
-static double double_area(const double *flat, const uint32_t *c) {
-  const double *p = flat + 2 * (size_t)c[0], *q = flat + 2 * (size_t)c[1], *r = flat + 2 * (size_t)c[2];
-  return (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
-}
 
 static double flat_distance(const double *flat, uint32_t a, uint32_t b) {
   const double *p = flat + 2 * (size_t)a, *q = flat + 2 * (size_t)b;
   return hypot(q[0] - p[0], q[1] - p[1]);
 }
 
-static double inner_radius(const double *flat, const uint32_t *c) {
-  double around = 0;
-  for (int k = 0; k < 3; k++) around += flat_distance(flat, c[k], c[(k + 1) % 3]);
-  return double_area(flat, c) / around;
+/* Of c from the line through a and b, to the left positive. */
+static double flat_height(const double *flat, uint32_t a, uint32_t b, uint32_t c) {
+  const double *p = flat + 2 * (size_t)a, *q = flat + 2 * (size_t)b, *r = flat + 2 * (size_t)c;
+  return ((q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])) / flat_distance(flat, a, b);
 }
 
-static bool is_beside_data(const void *arg, const convex_disc *disc, uint32_t h) {
+static bool is_flat(const void *arg, const convex_disc *disc, uint32_t h) {
   const rim_rule *rule = arg;
-  const uint32_t *c = disc->corners + h - h % 3;
-  double edge = flat_distance(rule->flat, disc->corners[h], disc->corners[mesh_next(h)]);
-  return inner_radius(rule->flat, c) > rule->radius || double_area(rule->flat, c) <= rule->height * edge;
+  uint32_t a = disc->corners[h], b = disc->corners[mesh_next(h)], c = disc->corners[mesh_previous(h)];
+  return flat_height(rule->flat, a, b, c) <= rule->height;
 }
 
-/* Takes off the triangles by which Delaunay fills the hull of points whose outline is not convex, and those without
- * height along sides that are straight but for rounding. */
-static batten_status peel_rim(batten_context *ctx, const double *flat, double rounding, convex_disc *disc) {
-  size_t count = disc->triangles;
-  double *radius = batten_alloc_array(ctx, count, sizeof *radius);
-  uint32_t *order = radius ? batten_alloc_array(ctx, count, sizeof *order) : NULL;
-  batten_status st = order ? BATTEN_OK : BATTEN_E_NOMEM;
-  for (size_t t = 0; st >= 0 && t < count; t++) radius[t] = inner_radius(flat, disc->corners + 3 * t);
-  if (st >= 0) st = batten_sort_points(ctx, 1, count, radius, order);
-  if (st >= 0) {
-    double common = radius[order[(size_t)(GAP_QUANTILE * (double)(count - 1))]];
-    rim_rule rule = {flat, GAP_FACTOR * common, FLAT_ROUNDINGS * rounding};
-    st = convex_disc_peel(ctx, disc, is_beside_data, &rule);
+static bool is_wide(const void *arg, const convex_disc *disc, uint32_t h) {
+  const rim_rule *rule = arg;
+  uint32_t a = disc->corners[h], b = disc->corners[mesh_next(h)];
+  return flat_distance(rule->flat, a, b) > GAP_FACTOR * fmax(rule->usual[a], rule->usual[b]);
+}
+
+static bool is_deep(const void *arg, uint32_t a, uint32_t b, size_t count, const uint32_t *apexes) {
+  const rim_rule *rule = arg;
+  for (size_t i = 0; i < count; i++)
+    if (flat_height(rule->flat, a, b, apexes[i]) > GAP_FACTOR * rule->usual[apexes[i]]) return true;
+  return false;
+}
+
+typedef struct nearest {
+  double length[3]; /* of the shortest edges, INFINITY where there are fewer */
+  uint32_t point[3];
+} nearest;
+
+static void add_near(nearest *n, double length, uint32_t point) {
+  for (int k = 0; k < 3; k++) {
+    if (!(length < n->length[k])) continue;
+    double t = n->length[k];
+    uint32_t p = n->point[k];
+    n->length[k] = length;
+    n->point[k] = point;
+    length = t;
+    point = p;
   }
-  batten_free(ctx, order);
-  batten_free(ctx, radius);
+}
+
+static nearest find_near(const convex_disc *disc, const double *flat, uint32_t i) {
+  nearest n = {{INFINITY, INFINITY, INFINITY}, {i, i, i}};
+  uint32_t h = disc->leaving[i];
+  while (h != MESH_NONE) {
+    uint32_t to = disc->corners[mesh_next(h)], back = disc->corners[mesh_previous(h)];
+    add_near(&n, flat_distance(flat, i, to), to);
+    h = convex_disc_turn(disc, h);
+    if (h == MESH_NONE) add_near(&n, flat_distance(flat, i, back), back); /* the last of a fan at the rim */
+    if (h == disc->leaving[i]) break;
+  }
+  return n;
+}
+
+/* third [points]: third shortest edge, of an ear the second; usual [points]: the least of that at a point and at the
+ * two nearest to it: the tip of a corner has long edges across a gap itself. */
+static void find_usual(const convex_disc *disc, const double *flat, double *third, double *usual) {
+  for (uint32_t i = 0; i < disc->points; i++) {
+    nearest n = find_near(disc, flat, i);
+    third[i] = isfinite(n.length[2]) ? n.length[2] : n.length[1];
+  }
+  for (uint32_t i = 0; i < disc->points; i++) {
+    nearest n = find_near(disc, flat, i);
+    usual[i] = fmin(third[i], fmin(third[n.point[0]], third[n.point[1]]));
+  }
+}
+
+static batten_status peel_rim(batten_context *ctx, const double *flat, double rounding, convex_disc *disc) {
+  double *third = batten_alloc_array(ctx, disc->points, sizeof *third);
+  double *usual = third ? batten_alloc_array(ctx, disc->points, sizeof *usual) : NULL;
+  rim_rule rule = {flat, usual, FLAT_ROUNDINGS * rounding};
+  batten_status st = usual ? convex_disc_peel(ctx, disc, &(convex_peel){&rule, is_flat, NULL}) : BATTEN_E_NOMEM;
+  if (st >= 0) {
+    find_usual(disc, flat, third, usual);
+    st = convex_disc_peel(ctx, disc, &(convex_peel){&rule, is_wide, is_deep});
+  }
+  batten_free(ctx, usual);
+  batten_free(ctx, third);
   return st;
 }
 

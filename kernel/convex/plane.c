@@ -22,7 +22,8 @@
 #include "mesh/predicates.h"
 #include "mesh/vec.h"
 
-/* Areas nearer to each other than this part are equal: far above rounding, far below what a user would see. */
+/* Areas (and cosines) nearer to each other than this part are equal: far above rounding, far below what a user would
+ * see. */
 static const double AREA_TIE = 1e-9;
 
 batten_status convex_scale_find(batten_context *ctx, size_t count, const double *points, convex_scale *out) {
@@ -140,11 +141,12 @@ static size_t climb(const caliper *c, size_t start, const double *d) {
   return i;
 }
 
-static void edge_direction(const caliper *c, size_t edge, double *d) {
+static double edge_direction(const caliper *c, size_t edge, double *d) {
   const double *p = corner(c, edge), *q = corner(c, edge + 1);
   double length = hypot(q[0] - p[0], q[1] - p[1]);
   d[0] = (q[0] - p[0]) / length;
   d[1] = (q[1] - p[1]) / length;
+  return length;
 }
 
 /* area [corners] of the least rectangle with a side along each edge of the hull; returns the least. */
@@ -188,19 +190,19 @@ static double choose_side(const frame *f, const double *d, double *u) {
   return best;
 }
 
-/* u: unit direction of the side that is u, of the least rectangle. */
+/* u: unit direction of the side that is u, of the least rectangle: by the longest edge along it, whose direction is
+ * the least rounded. */
 static void choose_rectangle(const frame *f, const caliper *c, double *area, double *u) {
-  double least = turn_calipers(c, area), best = -INFINITY;
+  double least = turn_calipers(c, area), best = -INFINITY, longest = 0;
   for (size_t edge = 0; edge < c->corners; edge++) {
     double d[2], side[2];
     if (area[edge] > least * (1 + AREA_TIE)) continue;
-    edge_direction(c, edge, d);
-    double score = choose_side(f, d, side);
-    if (score > best) {
-      best = score;
-      u[0] = side[0];
-      u[1] = side[1];
-    }
+    double length = edge_direction(c, edge, d), score = choose_side(f, d, side);
+    if (score < best - AREA_TIE || (score < best + AREA_TIE && length <= longest)) continue;
+    best = score;
+    longest = length;
+    u[0] = side[0];
+    u[1] = side[1];
   }
 }
 

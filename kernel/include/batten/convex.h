@@ -27,9 +27,9 @@ typedef enum batten_parametrization {
   BATTEN_PARAMETERS_FLOATER   /* shape-preserving [Floater 1997]: the boundary of a triangulation goes to the boundary
                                  of the square by chord length, its corners to four of its vertices, and every inner
                                  vertex is a convex combination of its neighbours. Without triangles: those of Delaunay
-                                 in the best plane, less those at the rim that cover wide gaps of the data (the circle
-                                 in them is more than 4 times that in 90 % of all triangles) or are flat to rounding;
-                                 points at one place there get the same parameters. */
+                                 in the best plane, less those at the rim that are flat to rounding, and those that fill
+                                 gaps more than 4 times as wide and deep as the points' usual distances there; points
+                                 at one place in the plane get the same parameters. */
 } batten_parametrization;
 
 typedef struct batten_parametrize_options {
