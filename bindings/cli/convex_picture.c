@@ -120,8 +120,8 @@ static convex_frame turn_up(const double n[3], unsigned up) {
   return f;
 }
 
-/* 60 degrees. */
-static const double upright_cosine = 0.5;
+/* 15 degrees: the camera looks down on surfaces that are tilted so far away from it, too. */
+static const double upright_cosine = 0.966;
 
 static convex_frame choose_frame(const drawing *d, unsigned up) {
   convex_frame same = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
@@ -421,6 +421,7 @@ batten_status cli_convex_picture(batten_context *ctx, const batten_surface *unco
              left ? "Gaussian curvature, unconstrained" : "Gaussian curvature, convex");
     d[i].space_options.point_count = count;
     d[i].space_options.points = turned;
+    d[i].space_options.point_scale = 0.75; /* ellipses want to be seen between them */
     panels[i] = (batten_picture_panel){d[i].space, &d[i].space_options, 1};
     panels[sides + i] = (batten_picture_panel){d[i].plot, &d[i].plot_options, 2};
   }

@@ -75,6 +75,8 @@ batten_status picture_check_options(batten_context *ctx, const batten_picture_op
     return batten_fail(ctx, BATTEN_E_INVALID, "opt.up_axis: %u; must be 0 (x), 1 (y) or 2 (z)", o.up_axis);
   if (o.point_count && !o.points)
     return batten_fail(ctx, BATTEN_E_INVALID, "opt.points: NULL with opt.point_count = %zu", o.point_count);
+  if (!(o.point_scale >= 0 && o.point_scale <= 10))
+    return batten_fail(ctx, BATTEN_E_INVALID, "opt.point_scale: %g; must be 0 .. 10", o.point_scale);
   size_t numbers;
   if (!batten_mul(o.point_count, dimension, &numbers))
     return batten_fail(ctx, BATTEN_E_TOO_LARGE, "opt.point_count: %zu is too many", o.point_count);

@@ -136,6 +136,7 @@ static void fill_scene(const picture_ball *ball, const batten_mesh *mesh, const 
       picture_to_ball(ball, o->lines[l].segments + 3 * i, segment);
   /* Dots cover a share of the surface, whatever their number, between just visible and not clumsy. */
   if (s->dot_count) s->dot_radius = fminf(0.016f, fmaxf(0.0035f, 0.3f / sqrtf((float)s->dot_count)));
+  if (o->point_scale > 0) s->dot_radius *= (float)o->point_scale;
 }
 
 static batten_status scene_make(batten_context *ctx, picture_view *view) {

@@ -186,6 +186,26 @@ static void test_axes(batten_context *ctx) {
   batten_mesh_free(mesh);
 }
 
+/* A dot before the ball, and the same of twice the size. */
+static void test_dots(batten_context *ctx, const batten_mesh *ball) {
+  const double dot[] = {5.05, 5.43, 5};
+  double *colors = blue(ball);
+  batten_picture_options o = parted(colors);
+  o.width = 320, o.height = 240, o.elevation_deg = 0, o.point_count = 1, o.points = dot;
+  spot s[2];
+  for (int i = 0; i < 2; i++) {
+    o.point_scale = 2 * (i + 1);
+    T_OK(batten_picture_mesh(ctx, ball, &o, path_a), ctx);
+    pixels p = read_png(path_a);
+    s[i] = find(&p, is_red, 0, 0, 320, 240);
+    free(p.rgb);
+  }
+  T_CHECK(across(&s[0]) > 4, "a dot is seen");
+  T_RATIO(fabs(across(&s[1]) - 2 * across(&s[0])), 2, "dots have the size asked for: %g, %g pixels", across(&s[0]),
+          across(&s[1]));
+  free(colors);
+}
+
 /* A sheet seen from below: brown, or as from above. */
 static void test_sides(batten_context *ctx) {
   const double v[][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}, ones[] = {1, 1, 1, 1};
@@ -279,7 +299,9 @@ static void test_bad_lines(batten_context *ctx, const batten_mesh *ball) {
   T_STATUS(batten_picture_mesh(ctx, ball, &o, path_a), BATTEN_E_INVALID, ctx, "opt.lines[1].width: -1");
   lines[1] = fine, lines[1].hidden = NAN;
   T_STATUS(batten_picture_mesh(ctx, ball, &o, path_a), BATTEN_E_INVALID, ctx, "opt.lines[1].hidden: nan");
-  o.line_count = 0;
+  o.line_count = 0, o.point_scale = 11;
+  T_STATUS(batten_picture_mesh(ctx, ball, &o, path_a), BATTEN_E_INVALID, ctx, "opt.point_scale: 11; must be 0 .. 10");
+  o.point_scale = 0;
   batten_picture_axes axes = {.upper = {1, 1, 1}, .to = {1, 1, 1}};
   o.axes = &axes, axes.lower[1] = 1;
   T_STATUS(batten_picture_mesh(ctx, ball, &o, path_a), BATTEN_E_INVALID, ctx, "opt.axes->lower[1], upper: 1, 1");
@@ -297,6 +319,7 @@ int main(void) {
   test_lines(ctx, ball);
   test_axes(ctx);
   test_sides(ctx);
+  test_dots(ctx, ball);
   test_bad(ctx, ball);
   test_bad_lines(ctx, ball);
   batten_mesh_free(ball);

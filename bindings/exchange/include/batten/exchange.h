@@ -270,6 +270,7 @@ typedef struct batten_picture_options {
   const batten_picture_axes *axes;   /* mesh: box with scales in place of a ground with shadows; NULL = none */
   const char *caption;     /* mesh: a smaller line below the title; NULL = none; ASCII */
   int no_color_bar;        /* mesh: non-zero: colours without their scale */
+  double point_scale;      /* mesh: size of the dots, in that which suits their number, 0 .. 10; 0 = 1 */
   int both_sides;          /* mesh: non-zero: triangles look alike from both sides; else brown from behind */
 } batten_picture_options;
 BATTEN_API batten_picture_options batten_picture_options_default(void);
