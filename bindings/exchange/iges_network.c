@@ -23,27 +23,17 @@ typedef struct iges_network {
 
 /* ---- entities ---------------------------------------------------------------------------------------- */
 
-static void bezier_knots(unsigned degree, double knots[2 * BX_DEGREE_MAX + 2]) {
-  for (unsigned i = 0; i < 2 * (degree + 1); i++) knots[i] = i <= degree ? 0 : 1;
-}
-
 static void put_surface(iges_network *n, unsigned degree) {
   static const bool open[2] = {false, false};
   double knots[2 * BX_DEGREE_MAX + 2];
-  size_t count = 2 * ((size_t)degree + 1);
-  bezier_knots(degree, knots);
-  iges_put_surface(n->file,
-                   &(batten_surface_form){.degree = {degree, degree},
-                                          .knot_count = {count, count},
-                                          .knots = {knots, knots},
-                                          .control_points = n->square[0]},
-                   open);
+  batten_surface_form form = bx_square_form(degree, n->square[0], knots);
+  iges_put_surface(n->file, &form, open);
 }
 
 static void put_curve(iges_file *f, unsigned degree, const double (*points)[3]) {
   double knots[2 * BX_DEGREE_MAX + 2];
-  bezier_knots(degree, knots);
-  iges_put_curve(f, degree, 2 * ((size_t)degree + 1), knots, points[0]);
+  size_t count = bx_bezier_knots(degree, knots);
+  iges_put_curve(f, degree, count, knots, points[0]);
 }
 
 static void put_line(iges_file *f, const double from[2], const double to[2]) {

@@ -88,6 +88,18 @@ void bx_patch_at(bx_square_work *work, unsigned n, const double *net, double u, 
 
 /* ---- curves -------------------------------------------------------------------------------------- */
 
+size_t bx_bezier_knots(unsigned n, double knots[2 * BX_DEGREE_MAX + 2]) {
+  size_t count = 2 * ((size_t)n + 1);
+  for (size_t i = 0; i < count; i++) knots[i] = i <= n ? 0 : 1;
+  return count;
+}
+
+batten_surface_form bx_square_form(unsigned n, const double *points, double knots[2 * BX_DEGREE_MAX + 2]) {
+  size_t count = bx_bezier_knots(n, knots);
+  return (batten_surface_form){
+      .degree = {n, n}, .knot_count = {count, count}, .knots = {knots, knots}, .control_points = points};
+}
+
 void bx_patch_side(unsigned n, const double *net, unsigned k, double (*out)[3]) {
   for (unsigned i = 0; i <= n; i++) {
     size_t at = k == 0 ? index_of(n, i, 0) : k == 1 ? index_of(n, n - i, i) : index_of(n, 0, n - i);

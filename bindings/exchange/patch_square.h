@@ -13,8 +13,8 @@ enum {
 /* Where the corners (s, t) = (0, 0), (1, 0), (0, 1), (1, 1) of a square lie on the triangle: barycentric, sums 1. */
 typedef double bx_corners[4][3];
 
-/* The squares of a form: 1, or 3 for QUADS, where square q is the one at the patch's corner q. Side s of a square runs
- * from its loop's corner s to the next. */
+/* The squares of a form: 1, or 3 for QUADS, where square q is the one at the patch's corner q. Side s of a square
+ * runs from its loop's corner s to the next. */
 unsigned bx_squares_of(batten_cad_form form);
 void bx_corners_of(batten_cad_form form, unsigned square, bx_corners out);
 
@@ -26,6 +26,11 @@ typedef struct bx_square_work {
 /* Control points [(n + 1)][(n + 1)][3] of S(s, t) = patch at the bilinear mean of the corners: degree n in s (first
  * index) and t. */
 void bx_patch_square(bx_square_work *work, unsigned n, const double *net, const bx_corners corners, double *out);
+
+/* Knots of Bezier curves and patches in [0, 1]: knots [2 n + 2]. Returns how many they are. */
+size_t bx_bezier_knots(unsigned n, double knots[2 * BX_DEGREE_MAX + 2]);
+/* What bx_patch_square gave as the surface that it is; the arrays stay the caller's. */
+batten_surface_form bx_square_form(unsigned n, const double *points, double knots[2 * BX_DEGREE_MAX + 2]);
 
 /* Control points [n + 1] of the side from corner k to corner k + 1 of the triangle. */
 void bx_patch_side(unsigned n, const double *net, unsigned k, double (*out)[3]);

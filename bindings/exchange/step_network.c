@@ -44,20 +44,15 @@ typedef struct step_file {
 
 /* ---- curves and surfaces ----------------------------------------------------------------------------- */
 
-/* Control points [2 (degree + 1)] of a patch have these knots. */
-static void bezier_knots(unsigned degree, double knots[2 * BX_DEGREE_MAX + 2]) {
-  for (unsigned i = 0; i < 2 * (degree + 1); i++) knots[i] = i <= degree ? 0 : 1;
-}
-
 /* EDGE_CURVE between two vertices, whose points are the curve's ends. */
 static uint64_t put_curve(step_file *s, unsigned degree, const double (*points)[3], uint64_t from, uint64_t to) {
   uint64_t ids[BX_DEGREE_MAX + 1];
   double knots[2 * BX_DEGREE_MAX + 2];
-  bezier_knots(degree, knots);
+  size_t count = bx_bezier_knots(degree, knots);
   ids[0] = from - 1;
   ids[degree] = to - 1;
   for (unsigned i = 1; i < degree; i++) ids[i] = step_put_point(&s->text, points[i]);
-  uint64_t curve = step_put_curve(&s->text, degree, 2 * ((size_t)degree + 1), knots, ids, false);
+  uint64_t curve = step_put_curve(&s->text, degree, count, knots, ids, false);
   return step_put_edge(&s->text, from, to, curve);
 }
 
@@ -78,14 +73,8 @@ static wire put_wire(step_file *s, unsigned degree, const double (*points)[3], u
 static uint64_t put_surface(step_file *s, unsigned degree, const double (*points)[3]) {
   static const bool open[2] = {false, false};
   double knots[2 * BX_DEGREE_MAX + 2];
-  size_t count = 2 * ((size_t)degree + 1);
-  bezier_knots(degree, knots);
-  return step_put_surface(&s->text,
-                          &(batten_surface_form){.degree = {degree, degree},
-                                                 .knot_count = {count, count},
-                                                 .knots = {knots, knots},
-                                                 .control_points = points[0]},
-                          open);
+  batten_surface_form form = bx_square_form(degree, points[0], knots);
+  return step_put_surface(&s->text, &form, open);
 }
 
 /* ---- faces ------------------------------------------------------------------------------------------- */
