@@ -98,9 +98,9 @@ BATTEN_API batten_status batten_surface_measure(batten_context *ctx, const batte
 /* ---- the proof of convexity --------------------------------------------------------------------- */
 
 /* With L' = x_uu . (x_u x x_v), M' and N' likewise, K |x_u x x_v|^4 = L'N' - M'^2. On each span pair, subdivided as
- * need be, the Bernstein coefficients of this polynomial and those of L' must have the right sign by more than all
- * rounding errors together: then K > 0 everywhere, the surface has a normal everywhere, and bends to one side. Knows
- * nothing of how the surface was made. */
+ * need be, the Bernstein coefficients of this polynomial less margin |x_u x x_v|^4 must be positive by more than all
+ * rounding errors together: then K > margin everywhere, the surface has a normal everywhere, and L' vanishes nowhere:
+ * the sign of one value is that of all. Knows nothing of how the surface was made. */
 typedef struct batten_convexity_options {
   size_t struct_size;
   const signed char *signs; /* [span pairs in u][in v] what is to be shown: +1 normal curvatures have the sign of L' >
@@ -116,15 +116,17 @@ BATTEN_API batten_convexity_options batten_convexity_options_default(void);
 
 typedef struct batten_convexity {
   int certified;       /* non-zero: proven on every span pair of which it was asked */
-  int flat;            /* non-zero: all of L', M', N' vanish to rounding: a plane, convex, but not strictly */
-  int sign;            /* of L' where one sign is asked for: +1, -1; 0 when it is not one */
-  double margin_min;   /* least over all boxes of the proven lower bound of K (of slack > 0: with it), 1 / unit^2, to
-                          within a tenth of what the surface has; below or equal 0 when not certified: the least value
-                          of K that was met */
-  double worst_at[2];  /* the middle of that box */
+  int flat;            /* non-zero: all of L', M', N' vanish to rounding, that of the control points included: a plane,
+                          a line or a point, convex, but not strictly: certified is 0 (without slack) */
+  int sign;            /* of L' when certified and one sign was asked for: +1, -1; else 0 */
+  double margin_min;   /* K is proven to be larger everywhere (with slack: (L' + slack)(N' + slack) - M'^2 over |x_u x
+                          x_v|^4 is), 1 / unit^2: at least nine tenths of the least K, unless depth_max or box_limit
+                          ended the search (with slack it may be less). 0 when nothing was asked. When not certified:
+                          the least K that was met, or 0 when all were positive */
+  double worst_at[2];  /* where the least K was met */
   size_t boxes;        /* that were looked at */
   unsigned depth;      /* bisections of the smallest */
-  size_t unproven;     /* boxes given up */
+  size_t unproven;     /* boxes given up; the search ends with the first */
   int graph;           /* non-zero: one direction is proven to have a positive product with all normals (or a negative
                           one with all): the surface has no folds over the plane across it */
   double direction[3]; /* that direction, unit; 0 when not graph */
