@@ -278,7 +278,8 @@ static void test_random(batten_context *ctx) {
   uint64_t seed = 5;
   for (int k = 0; k < 240; k++) {
     unsigned m = 2 + (unsigned)(t_random(&seed) % 4), n = 2 + (unsigned)(t_random(&seed) % 4);
-    scene s = cap(m, n, 0.3 + t_uniform(&seed), 0.3 + 0.7 * t_uniform(&seed), 0.2 * pow(t_uniform(&seed), 2), &seed);
+    double a = 0.3 + t_uniform(&seed), b = 0.3 + 0.7 * t_uniform(&seed), noise = 0.2 * pow(t_uniform(&seed), 2);
+    scene s = cap(m, n, a, b, noise, &seed);
     batten_convexity c = prove(ctx, &s, NULL);
     double least = least_gauss(&s, 25);
     certified += c.certified != 0;
