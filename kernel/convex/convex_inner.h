@@ -3,7 +3,8 @@
  * parameters.c             batten_parametrize
  * plane.c                  the best plane and the least rectangle in it
  * disc.c, outline.c        triangulations that are a disc; how their rim goes to the square's
- * floater.c                shape-preserving parameters (triangulation: mesh/delaunay.c, system: sparse/averages.c)
+ * cloud.c                  the disc that points without triangles form (mesh/delaunay.c)
+ * floater.c                shape-preserving parameters of a disc (sparse/averages.c)
  * objective.c              sums of squares and tension as matrices; their minimum
  * cones.c                  bounding cones of first derivatives and of their cross products on a box
  * boxes.c                  where the reference is convex enough for linear inequalities, by bisection [section 4]
