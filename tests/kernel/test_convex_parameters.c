@@ -247,12 +247,14 @@ static void test_caps(batten_context *ctx) {
   static const double reach[5] = {30, 80, 110, 150, 170};
   for (int k = 0; k < 5; k++) {
     scene s = cap(16, 36, reach[k] * PI / 180);
-    double *uv = malloc(2 * s.count * sizeof *uv);
+    double *uv = malloc(2 * s.count * sizeof *uv), *other = malloc(2 * s.count * sizeof *uv);
     T_OK(parametrize(ctx, &s, BATTEN_PARAMETERS_PROJECT, uv), ctx);
     size_t projected = count_folds(&s, uv);
     T_CHECK((projected > 0) == (reach[k] > 90), "PROJECT of a cap to %g degrees folds %zu triangles", reach[k],
             projected);
-    T_OK(parametrize(ctx, &s, BATTEN_PARAMETERS_AUTO, uv), ctx);
+    T_OK(parametrize(ctx, &s, BATTEN_PARAMETERS_AUTO, other), ctx);
+    T_CHECK((memcmp(uv, other, 2 * s.count * sizeof *uv) == 0) == (reach[k] < 60), "AUTO projects up to 65 degrees");
+    T_OK(parametrize(ctx, &s, BATTEN_PARAMETERS_FLOATER, uv), ctx);
     size_t folds = count_folds(&s, uv), on_side[4] = {0};
     T_CHECK(folds == 0 && is_in_square(s.count, uv), "FLOATER of it folds %zu of %zu", folds, s.triangle_count);
     for (size_t i = s.count - 36; i < s.count; i++)
@@ -262,6 +264,7 @@ static void test_caps(batten_context *ctx) {
             on_side[2], on_side[3]);
     T_RATIO(hypot(uv[0] - 0.5, uv[1] - 0.5), 1e-12, "its pole is in the middle");
     drop(&s);
+    free(other);
     free(uv);
   }
 }
@@ -273,14 +276,14 @@ static void test_floater_invariance(batten_context *ctx) {
   double *uv = malloc(2 * s.count * sizeof *uv), *moved = malloc(2 * s.count * sizeof *uv);
   scene other = new_scene(s.count, s.triangle_count);
   memcpy(other.triangles, s.triangles, 3 * s.triangle_count * sizeof(uint32_t));
-  T_OK(parametrize(ctx, &s, BATTEN_PARAMETERS_AUTO, uv), ctx);
+  T_OK(parametrize(ctx, &s, BATTEN_PARAMETERS_FLOATER, uv), ctx);
   for (size_t i = 0; i < 3 * s.count; i++) other.points[i] = ldexp(s.points[i], 900);
-  T_OK(parametrize(ctx, &other, BATTEN_PARAMETERS_AUTO, moved), ctx);
+  T_OK(parametrize(ctx, &other, BATTEN_PARAMETERS_FLOATER, moved), ctx);
   T_CHECK(memcmp(uv, moved, 2 * s.count * sizeof *uv) == 0, "FLOATER scaled by 2^900: same bits");
   for (int k = 0; k < 4; k++) {
     memcpy(other.points, s.points, 3 * s.count * sizeof(double));
     move(&other, k, 3);
-    T_OK(parametrize(ctx, &other, BATTEN_PARAMETERS_AUTO, moved), ctx);
+    T_OK(parametrize(ctx, &other, BATTEN_PARAMETERS_FLOATER, moved), ctx);
     T_RATIO(turned_distance(s.count, uv, moved), 1e-11, "FLOATER turned by %d rad and moved", k);
   }
   /* Other numbers for the points, other order and first corners for the triangles. */
@@ -288,7 +291,7 @@ static void test_floater_invariance(batten_context *ctx) {
   for (uint32_t i = 0; i <= last; i++) memcpy(other.points + 3 * i, s.points + 3 * (last - i), 3 * sizeof(double));
   for (uint32_t t = 0; t <= t_last; t++)
     for (uint32_t k = 0; k < 3; k++) other.triangles[3 * t + k] = last - s.triangles[3 * (t_last - t) + (k + 1) % 3];
-  T_OK(parametrize(ctx, &other, BATTEN_PARAMETERS_AUTO, moved), ctx);
+  T_OK(parametrize(ctx, &other, BATTEN_PARAMETERS_FLOATER, moved), ctx);
   double worst = 0;
   for (uint32_t i = 0; i <= last; i++)
     for (uint32_t k = 0; k < 2; k++) worst = fmax(worst, fabs(moved[2 * i + k] - uv[2 * (last - i) + k]));
@@ -304,6 +307,7 @@ static void test_corners(batten_context *ctx) {
   double *uv = malloc(2 * s.count * sizeof *uv);
   uint32_t corners[4] = {26, 29, 30, 36};
   batten_parametrize_options o = batten_parametrize_options_default();
+  o.method = BATTEN_PARAMETERS_FLOATER;
   o.triangles = s.triangles;
   o.triangle_count = s.triangle_count;
   o.corners = corners;
@@ -339,7 +343,7 @@ static void test_flat_edges(batten_context *ctx) {
     if (i < 10)
       for (uint32_t k = 0; k < 3; k++) s.triangles[3 * i + k] = k ? i + k : 0;
   }
-  T_OK(parametrize(ctx, &s, BATTEN_PARAMETERS_AUTO, uv), ctx);
+  T_OK(parametrize(ctx, &s, BATTEN_PARAMETERS_FLOATER, uv), ctx);
   bool on_rim = true;
   for (int i = 0; i < 12; i++)
     on_rim = on_rim && (uv[2 * i] == 0 || uv[2 * i] == 1 || uv[2 * i + 1] == 0 || uv[2 * i + 1] == 1);
@@ -357,7 +361,7 @@ static void test_flat_edges(batten_context *ctx) {
     for (int k = 0; k < 2; k++) s.points[3 * i + k] = xy[i][k];
   memcpy(s.triangles, corners, sizeof corners);
   s.triangle_count = 5;
-  T_OK(parametrize(ctx, &s, BATTEN_PARAMETERS_AUTO, uv), ctx);
+  T_OK(parametrize(ctx, &s, BATTEN_PARAMETERS_FLOATER, uv), ctx);
   T_CHECK(uv[9] == 0 && uv[11] > 1e-4 && uv[11] < 0.3, "a point behind a flat edge is inside: v = %g", uv[11]);
   drop(&s);
 }
@@ -433,6 +437,7 @@ static void check_no_disc(batten_context *ctx, size_t count, size_t triangle_cou
   for (int i = 0; i < 30; i++) p[i] = t_uniform(&seed);
   for (int i = 0; i < 20; i++) uv[i] = before[i] = i;
   batten_parametrize_options o = batten_parametrize_options_default();
+  o.method = BATTEN_PARAMETERS_FLOATER;
   o.triangles = triangles;
   o.triangle_count = triangle_count;
   T_STATUS(batten_parametrize(ctx, count, p, &o, uv), BATTEN_E_INVALID, ctx, text);
@@ -469,6 +474,10 @@ static batten_status project_once(batten_context *ctx, void *arg) {
   double uv[2 * 37];
   return parametrize(ctx, arg, BATTEN_PARAMETERS_PROJECT, uv);
 }
+static batten_status auto_once(batten_context *ctx, void *arg) {
+  double uv[2 * 37];
+  return parametrize(ctx, arg, BATTEN_PARAMETERS_AUTO, uv);
+}
 static batten_status floater_once(batten_context *ctx, void *arg) {
   double uv[2 * 37];
   return parametrize(ctx, arg, BATTEN_PARAMETERS_FLOATER, uv);
@@ -478,6 +487,7 @@ static void test_failures(void) {
   scene s = cap(3, 12, 1);
   t_fail_every_allocation("PROJECT", project_once, &s);
   t_cancel_every_progress("PROJECT", project_once, &s);
+  t_fail_every_allocation("AUTO", auto_once, &s);
   t_fail_every_allocation("FLOATER of triangles", floater_once, &s);
   s.triangle_count = 0;
   t_fail_every_allocation("FLOATER of points", floater_once, &s);

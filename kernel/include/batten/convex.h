@@ -22,7 +22,8 @@ extern "C" {
 /* ---- parameters of scattered points ------------------------------------------------------------- */
 
 typedef enum batten_parametrization {
-  BATTEN_PARAMETERS_AUTO = 0, /* FLOATER where triangles are given, else PROJECT */
+  BATTEN_PARAMETERS_AUTO = 0, /* PROJECT, unless the triangles are steep: more than 5 % of the points tilted by more
+                                 than 65 degrees against the best plane; then FLOATER */
   BATTEN_PARAMETERS_PROJECT,  /* into the best plane, in the least rectangle there */
   BATTEN_PARAMETERS_FLOATER   /* shape-preserving [Floater 1997]: the boundary of a triangulation goes to the boundary
                                  of the square by chord length, its corners to four of its vertices, and every inner
