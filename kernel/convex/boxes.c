@@ -57,11 +57,11 @@ static void along_u(unsigned width0, unsigned count0, unsigned count1, double (*
 
 /* Takes from the second derivatives what they have along x_u and x_v, by least squares over the box and as seen along
  * its normal. */
-static void remove_along(convex_patch *p, size_t net, double (*first)[CONVEX_NET][3]) {
+static void remove_along(convex_patch *p, size_t net) {
   const double *g = p->normal;
   double normal[3] = {0}, right[3][2] = {{0}};
   for (size_t i = 0; i < net; i++) {
-    const double *u = first[0][i], *v = first[1][i];
+    const double *u = p->raised[0][i], *v = p->raised[1][i];
     double gu = vec_dot(g, u), gv = vec_dot(g, v);
     normal[0] += vec_dot(u, u) - gu * gu;
     normal[1] += vec_dot(u, v) - gu * gv;
@@ -78,7 +78,7 @@ static void remove_along(convex_patch *p, size_t net, double (*first)[CONVEX_NET
     along[0] = det > 0 ? (normal[2] * right[h][0] - normal[1] * right[h][1]) / det : 0;
     along[1] = det > 0 ? (normal[0] * right[h][1] - normal[1] * right[h][0]) / det : 0;
     for (size_t i = 0; i < net; i++)
-      for (int k = 0; k < 3; k++) p->second[h][i][k] -= along[0] * first[0][i][k] + along[1] * first[1][i][k];
+      for (int k = 0; k < 3; k++) p->second[h][i][k] -= along[0] * p->raised[0][i][k] + along[1] * p->raised[1][i][k];
   }
 }
 
@@ -91,16 +91,16 @@ bool convex_patch_set(convex_patch *p, const convex_space *space, const double *
     memcpy(p->points[i * (n + 1)], reference + ((box->span[0] - m + i) * space->axis[1].count + box->span[1] - n) * 3,
            (n + 1) * sizeof *p->points);
 
-  double half[CONVEX_NET][3], first[2][CONVEX_NET][3];
+  double half[CONVEX_NET][3];
   const convex_axis_rows *u = &p->rows[0], *v = &p->rows[1];
   along_v(m + 1, n + 1, n + 1, p->points, v->value, half);
   along_u(m + 1, m, n + 1, half, u->first, p->first_u);
-  along_u(m + 1, m + 1, n + 1, half, u->first_raised, first[0]);
+  along_u(m + 1, m + 1, n + 1, half, u->first_raised, p->raised[0]);
   along_u(m + 1, m + 1, n + 1, half, u->second_raised, p->second[0]);
   along_v(m + 1, n + 1, n, p->points, v->first, half);
   along_u(m + 1, m + 1, n, half, u->value, p->first_v);
   along_v(m + 1, n + 1, n + 1, p->points, v->first_raised, half);
-  along_u(m + 1, m + 1, n + 1, half, u->value, first[1]);
+  along_u(m + 1, m + 1, n + 1, half, u->value, p->raised[1]);
   along_u(m + 1, m + 1, n + 1, half, u->first_raised, p->second[1]);
   along_v(m + 1, n + 1, n + 1, p->points, v->second_raised, half);
   along_u(m + 1, m + 1, n + 1, half, u->value, p->second[2]);
@@ -115,7 +115,7 @@ bool convex_patch_set(convex_patch *p, const convex_space *space, const double *
   if (!vec_normalize(p->normal) || !convex_cone_bound(m * (n + 1), p->first_u, p->normal, &p->cone[0]) ||
       !convex_cone_bound((m + 1) * n, p->first_v, p->normal, &p->cone[1]))
     return false;
-  remove_along(p, (m + 1) * (n + 1), first);
+  remove_along(p, (m + 1) * (n + 1));
   return true;
 }
 
@@ -244,6 +244,9 @@ static int sampled_sign(const convex_space *space, const double *reference) {
  * of second ones), to within a factor of 2^(1/8). */
 enum { WIDEST = 0, NARROWEST = -6, REFINEMENTS = 3 };
 
+/* Boxes still to be looked at: each division puts at most four in the place of one, at most 2 * depth_max deep. */
+enum { STACK = 3 * 2 * 10 + 1 };
+
 typedef struct search {
   const convex_space *space;
   const double *reference;
@@ -251,6 +254,7 @@ typedef struct search {
   int sign;
   bool widest;           /* else any delta will do */
   convex_patch patch[2]; /* of the box, and of its halves */
+  convex_box stack[STACK];
 } search;
 
 /* Whether the box can have cones wider by 2^exponent, with no more rows than `rays` give. */
@@ -320,9 +324,6 @@ static size_t divide(search *s, const convex_box *box, convex_box parts[4]) {
   return 2;
 }
 
-/* Boxes still to be looked at: each division puts at most four in the place of one, at most 2 * depth_max deep. */
-enum { STACK = 3 * 2 * 10 + 1 };
-
 typedef struct box_list {
   convex_box *boxes;
   size_t count, capacity, rows;
@@ -342,7 +343,7 @@ static batten_status push(batten_context *ctx, box_list *list, const convex_box 
 
 /* Divides one span pair. */
 static batten_status cover(batten_context *ctx, search *s, const convex_box *pair, box_list *list, bool *accepted) {
-  convex_box stack[STACK], parts[4];
+  convex_box *stack = s->stack, parts[4];
   size_t top = 0;
   stack[top++] = *pair;
   *accepted = true;

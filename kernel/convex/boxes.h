@@ -46,8 +46,9 @@ typedef struct convex_patch {
   double points[CONVEX_NET][3];  /* control points of the span pair */
   double first_u[CONVEX_NET][3]; /* coefficients of x_u [m][n + 1], x_v [m + 1][n] */
   double first_v[CONVEX_NET][3];
-  double along[3][2];              /* parts of x_u and x_v that are taken from x_uu, x_uv, x_vv */
   double second[3][CONVEX_NET][3]; /* of x_uu, x_uv, x_vv [m + 1][n + 1] */
+  double raised[2][CONVEX_NET][3]; /* of x_u, x_v, to the degree of second */
+  double along[3][2];              /* parts of x_u and x_v that are taken from x_uu, x_uv, x_vv */
   convex_cone cone[2];             /* of x_u, x_v, not widened */
   double normal[3];                /* mean x_u x mean x_v */
   size_t ray_count;                /* widened by the box's delta */
