@@ -278,13 +278,12 @@ done:
 
 /* ---- level curves -------------------------------------------------------------------------------- */
 
-/* A step of 1, 2 or 5 times a power of 10 of which about twelve fit into a range. */
-static double level_step(double range) {
-  double raw = range / 12, power = pow(10, floor(log10(raw))), lead = raw / power;
+/* A step of 1, 2 or 5 times a power of 10 of which about `count` fit into a range. */
+static double level_step(double range, double count) {
+  double raw = range / count, power = pow(10, floor(log10(raw))), lead = raw / power;
   return power * (lead < 1.5 ? 1 : lead < 3.5 ? 2 : lead < 7.5 ? 5 : 10);
 }
 
-/* Heights of both surfaces: the same levels on both. */
 static void height_range(const batten_mesh *mesh, unsigned up, double *low, double *high) {
   const double *v = batten_mesh_vertices(mesh);
   for (size_t i = 0; i < batten_mesh_vertex_count(mesh); i++) {
@@ -293,12 +292,23 @@ static void height_range(const batten_mesh *mesh, unsigned up, double *low, doub
   }
 }
 
+/* One for both surfaces, a dozen levels on the convex one; but an unconstrained surface that rises far above it is
+ * not to be black with them. */
+static double choose_step(const drawing *d, size_t sides, unsigned up) {
+  double step = 0;
+  for (size_t i = 0; i < sides; i++) {
+    double low = INFINITY, high = -INFINITY;
+    height_range(d[i].space, up, &low, &high);
+    if (high > low) step = fmax(step, level_step(high - low, i + 1 < sides ? 40 : 12));
+  }
+  return step > 0 ? step : 1;
+}
+
 static batten_status make_levels(batten_context *ctx, drawing *d, unsigned up, double step) {
-  enum { LEVELS_MAX = 4096 }; /* an unconstrained surface may rise far above the other */
   double low = INFINITY, high = -INFINITY;
   height_range(d->space, up, &low, &high);
   double first = ceil(low / step), last = floor(high / step);
-  if (!(last >= first) || last - first > LEVELS_MAX) return BATTEN_OK;
+  if (!(last >= first)) return BATTEN_OK;
   size_t count = (size_t)(last - first) + 1, V = batten_mesh_vertex_count(d->space);
   double *levels = batten_alloc_array(ctx, count, sizeof *levels);
   double *heights = batten_alloc_array(ctx, V, sizeof *heights);
@@ -394,7 +404,6 @@ batten_status cli_convex_picture(batten_context *ctx, const batten_surface *unco
                                  const batten_picture_options *view, const char *path) {
   size_t sides = unconstrained ? 2 : 1;
   unsigned up = view->up_axis;
-  double low = INFINITY, high = -INFINITY;
   drawing *d = batten_alloc_array(ctx, 2, sizeof *d);
   double *turned = batten_alloc_array(ctx, count, 3 * sizeof *turned);
   batten_status st = BATTEN_E_NOMEM;
@@ -409,8 +418,7 @@ batten_status cli_convex_picture(batten_context *ctx, const batten_surface *unco
   convex_frame frame = choose_frame(&d[sides - 1], up);
   st = draw(ctx, d, sides, &frame, up);
   if (st < 0) goto done;
-  height_range(d[sides - 1].space, up, &low, &high);
-  double step = high > low ? level_step(high - low) : 1;
+  double step = choose_step(d, sides, up);
   for (size_t i = 0; i < count; i++) convex_to_frame(&frame, points + 3 * i, turned + 3 * i);
   batten_picture_panel panels[4] = {{0}};
   for (size_t i = 0; st >= 0 && i < sides; i++) {
