@@ -24,7 +24,7 @@
 enum {
   DEPTH = 54, /* halvings: what is between such parts and the surface is below rounding */
   PARTS = DEPTH + 2,
-  PATIENCE = 1 << 16, /* parts of a span pair before more may be missed: about 100 ms */
+  PATIENCE = 1 << 18, /* parts of a span pair before more may be missed: about half a second */
   NET = BSPLINE_ORDER * BSPLINE_ORDER,
   SQUARE = 2 * BSPLINE_DEGREE + 1, /* coefficients of f in one direction */
   QUERIES = 16,                    /* of a task */
@@ -292,7 +292,8 @@ static double concavity(const search *s, const double *f) {
   vv *= (double)(n * (n - 1));
   uv *= (double)(m * n);
   if (uu >= 0 && vv >= 0 && uu * vv >= uv * uv) return 0;
-  return fmax(0, uv - fmin(uu, vv));
+  /* No matrix within the bounds has an eigenvalue below that of the bounds. */
+  return fmax(0, hypot(0.5 * (uu - vv), uv) - 0.5 * (uu + vv));
 }
 
 /* ---- one span pair ------------------------------------------------------------------------------- */

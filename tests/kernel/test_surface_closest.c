@@ -232,6 +232,21 @@ static void test_circle(batten_context *ctx) {
   batten_surface_free(s);
 }
 
+/* Over the bowl at the height h > 1 all places with r^2 = 2 (h - 1) are equally near, sqrt(2 h - 1) away. */
+static void test_ring(batten_context *ctx) {
+  surface_case c = surface_case_bowl(2, 1);
+  batten_surface *s = surface_case_make(ctx, &c);
+  const double point[3] = {0, 0, 1.3};
+  double place[2], distance, start = batten_now();
+  batten_status st = batten_surface_closest(ctx, s, 1, point, place, &distance);
+  printf("# %.3f s\n", batten_now() - start);
+  T_CHECK(
+      (st == BATTEN_OK || (st == BATTEN_W_ACCURACY && strstr(batten_error(ctx), "points[0]: the distance may be"))) &&
+          fabs(distance - sqrt(1.6)) < 1e-12 && fabs(hypot(place[0], place[1]) - sqrt(0.6)) < 1e-6,
+      "a ring of nearest places: %s", batten_status_name(st));
+  batten_surface_free(s);
+}
+
 static void test_bad(batten_context *ctx) {
   surface_case c = surface_case_bowl(3, 2);
   batten_surface *s = surface_case_make(ctx, &c);
@@ -298,6 +313,7 @@ int main(void) {
   test_same(ctx);
   test_degenerate(ctx);
   test_circle(ctx);
+  test_ring(ctx);
   test_bad(ctx);
   surface_case c = surface_case_random(3, 3, 2, 2, 1, 3);
   test_threads(&c);
