@@ -114,33 +114,6 @@ static batten_status tell_network(cli_run *run, const char *path, bool print, cl
   return st;
 }
 
-/* Different knots less one. */
-static size_t count_spans(const batten_surface_form *form, int direction) {
-  size_t count = 0;
-  for (size_t i = 1; i < form->knot_count[direction]; i++)
-    count += form->knots[direction][i] > form->knots[direction][i - 1];
-  return count;
-}
-
-static void tell_form(const batten_surface_form *form, bool print, cli_report *r) {
-  size_t points[2], spans[2];
-  for (int i = 0; i < 2; i++) {
-    points[i] = form->knot_count[i] - form->degree[i] - 1;
-    spans[i] = count_spans(form, i);
-  }
-  cli_report_count(r, "dimension", 3);
-  cli_report_count(r, "degree_u", form->degree[0]);
-  cli_report_count(r, "degree_v", form->degree[1]);
-  cli_report_count(r, "spans_u", spans[0]);
-  cli_report_count(r, "spans_v", spans[1]);
-  cli_report_count(r, "control_points", points[0] * points[1]);
-  if (!print) return;
-  cli_line("surface", "degree %u x %u, %zu x %zu control points, %zu x %zu spans", form->degree[0], form->degree[1],
-           points[0], points[1], spans[0], spans[1]);
-  cli_line("domain", "u %.6g .. %.6g, v %.6g .. %.6g", form->knots[0][0], form->knots[0][form->knot_count[0] - 1],
-           form->knots[1][0], form->knots[1][form->knot_count[1] - 1]);
-}
-
 static batten_status tell_surface(cli_run *run, const char *path, bool print, cli_report *r) {
   batten_surface *surface = NULL;
   batten_surface_measures m;
@@ -152,10 +125,14 @@ static batten_status tell_surface(cli_run *run, const char *path, bool print, cl
   if (st >= 0) {
     batten_surface_form form = batten_surface_get(surface);
     cli_run_clear(run);
-    tell_form(&form, print, r);
-    surface_report_measures(&m, r);
+    cli_report_count(r, "dimension", 3);
+    surface_report_form(&form, r);
     surface_report_convexity(&c, r);
+    surface_report_measures(&m, r);
     if (print) {
+      surface_print_form(&form);
+      cli_line("domain", "u %.6g .. %.6g, v %.6g .. %.6g", form.knots[0][0], form.knots[0][form.knot_count[0] - 1],
+               form.knots[1][0], form.knots[1][form.knot_count[1] - 1]);
       surface_print_measures(&m);
       surface_print_convexity(&c);
     }

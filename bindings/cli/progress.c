@@ -117,11 +117,23 @@ void cli_run_text(const cli_run *run, batten_status status, char *text, size_t s
       {"opt.density", "--density"},
       {"opt.tolerance", "--tolerance"},
       {"noise: ", "--smooth: "},
+      {"opt.smoothness", "--smoothness"},
+      {"opt.domain", "--domain"},
+      {"opt.parametrize.triangles", "triangles"},
+      {"opt.parameters", "parameters"},
+      {"opt.weights", "weights"},
+      {"opt.rounds", "--rounds"},
+      {"opt.spans", "--spans"},
+      {"opt.degree", "--degree"},
+      {"opt.gap_tol", "--gap"},
+      {"gap_tol", "--gap"},
+      {"count: ", ""},
       {"triangles: ", "--faces: "},
   };
   const char *own = batten_error(run->ctx);
-  static const char *const about_input[] = {"points", "matrix", "seeds",    "problem",
-                                            "edge",   "vert",   "triangle", "mesh"};
+  static const char *const about_input[] = {"points",         "matrix",      "seeds",           "problem",
+                                            "edge",           "vert",        "triangle",        "mesh",
+                                            "opt.parameters", "opt.weights", "opt.parametrize", "count"};
   bool input = false;
   for (size_t i = 0; i < sizeof about_input / sizeof *about_input; i++)
     input = input || strncmp(own, about_input[i], strlen(about_input[i])) == 0;

@@ -4,8 +4,10 @@
 
 #include "cli.h"
 
+void surface_report_form(const batten_surface_form *form, cli_report *r);
 void surface_report_convexity(const batten_convexity *c, cli_report *r);
 void surface_report_measures(const batten_surface_measures *m, cli_report *r);
+void surface_print_form(const batten_surface_form *form);
 void surface_print_convexity(const batten_convexity *c);
 void surface_print_measures(const batten_surface_measures *m);
 

@@ -1,6 +1,34 @@
 /* Figures that a tensor-product surface itself has: the report's keys (docs/report.md), lines of the summary. */
 #include "surface.h"
 
+typedef struct sizes {
+  size_t points[2], spans[2];
+} sizes;
+
+static sizes sizes_of(const batten_surface_form *form) {
+  sizes s = {0};
+  for (int i = 0; i < 2; i++) {
+    s.points[i] = form->knot_count[i] - form->degree[i] - 1;
+    for (size_t k = 1; k < form->knot_count[i]; k++) s.spans[i] += form->knots[i][k] > form->knots[i][k - 1];
+  }
+  return s;
+}
+
+void surface_report_form(const batten_surface_form *form, cli_report *r) {
+  sizes s = sizes_of(form);
+  cli_report_count(r, "degree_u", form->degree[0]);
+  cli_report_count(r, "degree_v", form->degree[1]);
+  cli_report_count(r, "spans_u", s.spans[0]);
+  cli_report_count(r, "spans_v", s.spans[1]);
+  cli_report_count(r, "control_points", s.points[0] * s.points[1]);
+}
+
+void surface_print_form(const batten_surface_form *form) {
+  sizes s = sizes_of(form);
+  cli_line("surface", "degree %u x %u, %zu x %zu control points, %zu x %zu span%s", form->degree[0], form->degree[1],
+           s.points[0], s.points[1], s.spans[0], s.spans[1], s.spans[0] * s.spans[1] == 1 ? "" : "s");
+}
+
 void surface_report_convexity(const batten_convexity *c, cli_report *r) {
   cli_report_bool(r, "certified", c->certified != 0);
   cli_report_bool(r, "flat", c->flat != 0);
