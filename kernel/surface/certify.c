@@ -28,6 +28,7 @@ typedef struct certifier {
   certify_jet jet;
   certify_poly cross[3], form[3], square, determinant; /* x_u x x_v, (L', M', N'), |x_u x x_v|^2, D */
   double *slots, *work, *faces;
+  certify_box *stack;
   double (*normals)[3]; /* [spans][NORMALS * NORMALS], as many as there are */
   size_t normal_count;
 } certifier;
@@ -102,6 +103,8 @@ static size_t lay_out(certifier *c) {
   c->work = take(c, &used, full);
   batten_mul(2 * (size_t)c->opt->depth_max + 2, full, &slots);
   c->slots = take(c, &used, slots);
+  size_t boxes = (2 * (size_t)c->opt->depth_max + 2) * sizeof(certify_box) / sizeof(double);
+  c->stack = (certify_box *)take(c, &used, boxes);
   batten_mul3(c->spans[0], c->spans[1], 3 * NORMALS * NORMALS, &pairs);
   c->normals = (double(*)[3])take(c, &used, pairs);
   return used;
@@ -184,8 +187,11 @@ static void make_square(certifier *c, size_t mu, size_t nu, certify_square *s) {
   certify_clear(&v, 8 * m - 4, 8 * n - 4);
   certify_add_product(&v, 1, &c->square, &c->square, 1);
   certify_unscale(&v);
-  *s = (certify_square){
-      .degree = {d.degree[0], d.degree[1]}, .error = {d.error, v.error}, .slots = c->slots, .work = c->work};
+  *s = (certify_square){.degree = {d.degree[0], d.degree[1]},
+                        .error = {d.error, v.error},
+                        .slots = c->slots,
+                        .work = c->work,
+                        .stack = c->stack};
   for (int i = 0; i < 2; i++) {
     const double *knots = c->surface->space[i].knots + (i == 0 ? mu : nu);
     s->lower[i] = knots[0];
@@ -310,7 +316,7 @@ static void report(certifier *c, const verdict *v, batten_convexity *out) {
                         .unproven = p->unproven,
                         .worst_at = {p->least_at[0], p->least_at[1]}};
   if (v->certified)
-    r.margin_min = isfinite(least) ? fmin(CERTIFY_SHARE * least, p->bound) * scale : 0;
+    r.margin_min = isfinite(least) ? fmax(0, fmin(CERTIFY_SHARE * least, p->bound)) * scale : 0;
   else
     r.margin_min = fmin(least, 0) * scale;
   if (v->certified) r.sign = c->opt->signs ? common_sign(c) : v->sign == 2 ? 0 : v->sign;

@@ -97,12 +97,23 @@ typedef struct certify_proof {
 
 static const double CERTIFY_SHARE = 0.91;
 
+/* A part of the square that is not proven yet. */
+typedef struct certify_box {
+  double *c;                /* D and V */
+  double error[2], most[2]; /* of both */
+  double lower[2], upper[2];
+  unsigned depth[2], axis; /* axis: which to bisect */
+  double least;            /* coefficient of D - kappa V */
+  double bound;            /* below D / V by D and V apart */
+} certify_box;
+
 /* The square [lower, upper] of the domain, D and V behind each other in slots[0], of the same degrees, not scaled. */
 typedef struct certify_square {
   double lower[2], upper[2];
   unsigned degree[2];
   double error[2];
   double *slots, *work; /* slots [2 depth_max + 2][2][coefficients], work [2][coefficients] */
+  certify_box *stack;   /* [2 depth_max + 2] */
 } certify_square;
 
 /* Looks at D / V at the corners and at a grid within. */

@@ -8,17 +8,6 @@
 #include <math.h>
 #include <string.h>
 
-typedef struct box {
-  double *c;                /* D and V */
-  double error[2], most[2]; /* of both */
-  double lower[2], upper[2];
-  unsigned depth[2], axis; /* axis: which to bisect */
-  double least;            /* coefficient of D - kappa V */
-  double bound;            /* below D / V by D and V apart */
-} box;
-
-enum { STACK = 64 }; /* > 2 * 30 + 2 */
-
 static size_t coefficients(const certify_square *s) { return (size_t)(s->degree[0] + 1) * (s->degree[1] + 1); }
 
 static void meet(certify_proof *proof, double value, double u, double v) {
@@ -43,7 +32,7 @@ void certify_sample(certify_proof *proof, const certify_square *s) {
 }
 
 /* False when a corner shows that no part of the box that keeps it can be proven. */
-static bool look_at_corners(certify_proof *proof, const certify_square *s, const box *b) {
+static bool look_at_corners(certify_proof *proof, const certify_square *s, const certify_box *b) {
   size_t n = coefficients(s), columns = s->degree[1] + 1;
   bool possible = true;
   for (int k = 0; k < 4; k++) {
@@ -71,7 +60,7 @@ static unsigned longer_axis(const certify_square *s, const double *c) {
 }
 
 /* True when the box is proven; otherwise it is prepared for bisection. */
-static bool examine(certify_proof *proof, const certify_square *s, box *b) {
+static bool examine(certify_proof *proof, const certify_square *s, certify_box *b) {
   size_t n = coefficients(s);
   const double *d = b->c, *v = b->c + n;
   double kappa = fmax(0, CERTIFY_SHARE * proof->least), least = INFINITY, d_least = INFINITY;
@@ -94,7 +83,7 @@ static bool examine(certify_proof *proof, const certify_square *s, box *b) {
 }
 
 /* A box that will not be cut: proven with what it has, or given up. */
-static void settle(certify_proof *proof, const box *b) {
+static void settle(certify_proof *proof, const certify_box *b) {
   if (b->bound > 0 && isfinite(b->bound))
     proof->bound = fmin(proof->bound, b->bound);
   else
@@ -102,7 +91,7 @@ static void settle(certify_proof *proof, const box *b) {
 }
 
 /* Cuts the box into itself and `other`. */
-static void cut(const certify_square *s, box *b, box *other) {
+static void cut(const certify_square *s, certify_box *b, certify_box *other) {
   double *room = other->c;
   unsigned axis = b->axis;
   certify_bisect(axis, 2, s->degree[0] + 1, s->degree[1] + 1, b->c, room, s->work);
@@ -116,14 +105,14 @@ static void cut(const certify_square *s, box *b, box *other) {
 }
 
 /* True when the box has a direction left to be bisected in: sets its axis. */
-static bool can_cut(const certify_proof *proof, box *b) {
+static bool can_cut(const certify_proof *proof, certify_box *b) {
   if (proof->boxes >= proof->box_limit) return false;
   if (b->depth[b->axis] >= proof->depth_max) b->axis = 1 - b->axis;
   return b->depth[b->axis] < proof->depth_max;
 }
 
 /* Looks at a new box: -1 no part of it can be proven, 0 to be bisected, 1 proven. */
-static int judge(certify_proof *proof, const certify_square *s, box *b) {
+static int judge(certify_proof *proof, const certify_square *s, certify_box *b) {
   proof->boxes++;
   unsigned depth = b->depth[0] > b->depth[1] ? b->depth[0] : b->depth[1];
   if (depth > proof->depth) proof->depth = depth;
@@ -134,7 +123,7 @@ static int judge(certify_proof *proof, const certify_square *s, box *b) {
 /* Depth first, the worse half first: what cannot be proven is found soon. The boxes of the stack have been looked at.
  */
 batten_status certify_prove(batten_context *ctx, certify_proof *proof, const certify_square *s) {
-  box stack[STACK];
+  certify_box *stack = s->stack;
   size_t n = 2 * coefficients(s), count = 1;
   double done = 0;
   for (size_t k = 0; k < 2 * (size_t)proof->depth_max + 2; k++) stack[k].c = s->slots + k * n;
@@ -146,7 +135,7 @@ batten_status certify_prove(batten_context *ctx, certify_proof *proof, const cer
   if (first > 0) return BATTEN_OK;
   if (first < 0) proof->unproven++;
   for (size_t turn = 0; count > 0 && proof->unproven == 0; turn++) {
-    box *b = &stack[count - 1];
+    certify_box *b = &stack[count - 1];
     if (turn % 128 == 0) {
       double fraction = proof->progress[0] + done * (proof->progress[1] - proof->progress[0]);
       batten_status st = batten_progress(ctx, "certify", fmin(fraction, 1));
@@ -165,7 +154,7 @@ batten_status certify_prove(batten_context *ctx, certify_proof *proof, const cer
     }
     bool swap = verdict[0] == 1 ? verdict[1] != 1 : verdict[1] != 1 && b[0].least < b[1].least;
     if (swap) {
-      box other = b[0];
+      certify_box other = b[0];
       b[0] = b[1];
       b[1] = other;
     }

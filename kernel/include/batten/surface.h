@@ -105,7 +105,9 @@ BATTEN_API batten_status batten_surface_measure(batten_context *ctx, const batte
 /* With L' = x_uu . (x_u x x_v), M' and N' likewise, K |x_u x x_v|^4 = L'N' - M'^2. On each span pair, subdivided as
  * need be, the Bernstein coefficients of this polynomial less margin |x_u x x_v|^4 must be positive by more than all
  * rounding errors together: then K > margin everywhere, the surface has a normal everywhere, and L' vanishes nowhere:
- * the sign of one value is that of all. Knows nothing of how the surface was made. */
+ * the sign of one value is that of all. Knows nothing of how the surface was made. It speaks of span pairs: creases
+ * along inner knots that are there as often as the degree are not judged; nor is what lies far apart (graph tells
+ * more). */
 typedef struct batten_convexity_options {
   size_t struct_size;
   const signed char *signs; /* [span pairs in u][in v] what is to be shown: +1 normal curvatures have the sign of L' >
