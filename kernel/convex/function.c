@@ -358,11 +358,14 @@ static batten_status prove(function_fit *f, const batten_surface *surface, const
   double width = fmin(f->domain[0][1] - f->domain[0][0], f->domain[1][1] - f->domain[1][0]);
   double unit = 1 / (f->scale * width * width);
   batten_status st = BATTEN_OK;
-  if (f->space.opposite) o.slack = fmax(2 * -rounds->margin, 1e-10 * rounds->scale) * unit;
-  for (int attempt = 0; attempt < 5 && st == BATTEN_OK; attempt++) {
+  /* From a millionth of the curvature: with less, rounding of its product with the slack is above the slack's square.
+   * Where one attempt needs many boxes, the next one needs few. */
+  if (f->space.opposite) o.slack = fmax(2 * -rounds->margin, 1e-7 * rounds->scale) * unit;
+  for (int attempt = 0; attempt < 12 && st == BATTEN_OK; attempt++) {
+    if (f->space.opposite) o.box_limit = 20000;
     st = batten_surface_certify_convex(f->ctx, surface, &o, &info->convexity);
     if (info->convexity.certified || !f->space.opposite) break;
-    o.slack *= 8;
+    o.slack *= 2;
   }
   info->slack = o.slack;
   batten_free(f->ctx, signs);
@@ -436,8 +439,9 @@ batten_status batten_convex_function_fit(batten_context *ctx, size_t count, cons
   if (st == BATTEN_OK) st = allocate(&f);
   if (st == BATTEN_OK) st = function_terms_make(ctx, &f.space, count, f.scaled, f.weights, f.opt.tension, &terms);
   if (st < 0) goto done;
-  size_t fine = f.space.n; /* second derivatives of coefficients that are right to rounding */
-  double noise = 4 * DBL_EPSILON * f.noise * (double)(fine + 64);
+  double fine = 0;
+  for (int i = 0; i < 2; i++) fine = fmax(fine, (double)(f.space.spans[i] * f.opt.degree[i]));
+  double noise = 256 * DBL_EPSILON * f.noise * fine * fine; /* of second differences of coefficients */
   function_rounds_options how = {f.opt.rounds, f.opt.gap_tol, floor_of_squares, noise, false};
   st = function_rounds(ctx, &f.space, &terms, &how, f.x, f.unconstrained, &rounds);
   if (st < 0) goto done;

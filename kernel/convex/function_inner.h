@@ -24,12 +24,12 @@ typedef struct function_space {
   bool opposite;            /* span pairs of opposite signs touch: the Hessian vanishes there */
 } function_space;
 
-/* Compressed rows that grow; lower [rows]. */
+/* Compressed rows that grow, between lower and upper [rows]. */
 typedef struct function_matrix {
   size_t rows, row_room, entry_room;
   size_t *starts;
   uint32_t *indices;
-  double *values, *lower;
+  double *values, *lower, *upper;
 } function_matrix;
 
 void function_matrix_free(batten_context *ctx, function_matrix *m);
@@ -63,14 +63,13 @@ static inline int function_sign(const function_space *space, const uint32_t span
   return space->signs[span[0] * space->spans[1] + span[1]];
 }
 
-/* Rows [3][degree + 1][degree + 1]: Bernstein coefficients of f, f', f'' in one variable on part of a span, all of
- * this degree. */
-void function_axis_rows(const bspline *b, size_t mu, double lower, double upper, double *rows);
 /* Bernstein coefficients of the Hessian on a box: out [d_0 + 1][d_1 + 1][3]. */
 void function_hessian_box(const function_space *space, const function_box *box, const double *x, double *out);
 /* The Hessian at a place of a span pair. */
 void function_hessian_at(const function_space *space, const uint32_t span[2], const double place[2], const double *x,
                          double out[3]);
+/* Coefficients [n] of (x^2 + y^2) / 2, whose Hessian is the identity. */
+void function_bowl(const function_space *space, double *out);
 /* Eigenvalues, the larger first, and the angle of its direction; 0 for multiples of the identity. */
 void function_eigen(const double h[3], double values[2], double *angle);
 
@@ -85,6 +84,10 @@ typedef struct function_directions {
 batten_status function_rows_box(batten_context *ctx, const function_space *space, const function_box *box,
                                 const function_directions *opt, const double *reference, const double *other,
                                 double scale, function_matrix *rows);
+
+/* Equalities that hold where opposite signs meet along a line, appended: f is linear along it, its slope across is
+ * constant, and its second derivative across vanishes if that is continuous. */
+batten_status function_equalities(batten_context *ctx, const function_space *space, function_matrix *rows);
 
 /* Necessary inequalities where x violates them, appended: in every span pair at the places of a grid and at the worst
  * place near those. *worst: the least eigenvalue that was met, 0 if none is negative. */

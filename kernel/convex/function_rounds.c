@@ -11,6 +11,8 @@
  * less `margin` times the identity is to be semidefinite, so that convexity is strict. Where opposite signs touch the
  * Hessian vanishes, and nothing strict can be had. */
 #include <string.h>
+#include <stdio.h>
+#include <stdlib.h>
 
 #include "base/checked.h"
 #include "function_inner.h"
@@ -26,7 +28,7 @@ typedef struct rounds_state {
   batten_qp_workspace *workspace;
   function_matrix cuts, rows;
   size_t *row_box; /* [row_room] */
-  size_t row_room;
+  size_t row_room, equalities;
   signed char *cut_active, *row_active; /* [rows + n] */
   size_t cut_active_rows;
   function_box *boxes;
@@ -56,6 +58,7 @@ static batten_status minimise(rounds_state *s, const function_matrix *rows, bool
     c = function_matrix_view(rows, n);
     p.c = &c;
     p.lower = rows->lower;
+    p.upper = rows->upper;
   }
   o.x0 = start;
   o.active = active_start;
@@ -64,6 +67,11 @@ static batten_status minimise(rounds_state *s, const function_matrix *rows, bool
   double begin = batten_now();
   batten_status st = batten_qp_solve(s->ctx, &p, &o, s->workspace, &out, &info);
   s->info->time_qp += batten_now() - begin;
+  if (getenv("DBG"))
+    fprintf(stderr, "qp %s rows %zu used %zu eng %d it %zu t %.3f obj %.9g gap %.2g pr %.2g dr %.2g prox %zu %s\n",
+            batten_status_name(st), rows ? rows->rows : 0, info.rows_used, info.engine, info.iterations, info.time_s,
+            2 * info.objective, info.duality_gap, info.primal_residual, info.dual_residual, info.proximal_steps,
+            st ? batten_error(s->ctx) : "");
   *bound = -INFINITY;
   *solved = st == BATTEN_OK || st == BATTEN_W_ACCURACY;
   if (st == BATTEN_OK) *bound = 2 * (info.objective - fabs(info.duality_gap));
@@ -88,24 +96,6 @@ static double curvature_scale(const function_space *space, const double *x) {
       sum += h[3 * p] * h[3 * p] + 2 * h[3 * p + 1] * h[3 * p + 1] + h[3 * p + 2] * h[3 * p + 2];
   }
   return sqrt(sum / (double)(spans * points));
-}
-
-/* Coefficients of (x^2 + y^2) / 2: its Hessian is the identity. The blossom of t^2 is the mean of products of pairs.
- */
-static void make_bowl(const function_space *space, double *out) {
-  const bspline *b = space->spline.axis;
-  for (size_t k = 0; k < space->n; k++) {
-    size_t at[2] = {k / b[1].count, k % b[1].count};
-    out[k] = 0;
-    for (int i = 0; i < 2; i++) {
-      const double *knots = b[i].knots + at[i] + 1;
-      double sum = 0;
-      unsigned d = b[i].degree;
-      for (unsigned p = 0; p < d; p++)
-        for (unsigned q = p + 1; q < d; q++) sum += knots[p] * knots[q];
-      out[k] += sum / (d * (d - 1)); /* half of the mean over d (d - 1) / 2 pairs */
-    }
-  }
 }
 
 /* Takes x as the result when it is better and convex; where signs are equal it is made convex, which changes x. */
@@ -209,10 +199,13 @@ static batten_status make_rows(rounds_state *s, unsigned round) {
                              .margin = s->space->opposite ? 0 : s->margin};
   const double *reference = s->have_inner ? s->inner : s->opt->rows_only ? s->outer : s->best;
   s->rows.rows = 0;
+  batten_status st = function_equalities(s->ctx, s->space, &s->rows);
+  if (st < 0) return st;
+  s->equalities = s->rows.rows;
   for (size_t b = 0; b < s->box_count; b++) {
     size_t before = s->rows.rows;
-    batten_status st = function_rows_box(s->ctx, s->space, &s->boxes[b], &opt, reference,
-                                         s->have_inner ? s->outer : NULL, s->scale, &s->rows);
+    st = function_rows_box(s->ctx, s->space, &s->boxes[b], &opt, reference, s->have_inner ? s->outer : NULL, s->scale,
+                           &s->rows);
     if (st < 0) return st;
     if (s->rows.rows > s->row_room) {
       size_t room = s->rows.row_room;
@@ -230,7 +223,7 @@ static batten_status make_rows(rounds_state *s, unsigned round) {
 /* Quarters boxes with active rows, as long as there are not too many. */
 static batten_status refine_boxes(rounds_state *s) {
   size_t last = SIZE_MAX, count = s->box_count, per_box = s->rows.rows / (count ? count : 1) + 1;
-  for (size_t r = 0; r < s->rows.rows; r++) {
+  for (size_t r = s->equalities; r < s->rows.rows; r++) {
     size_t b = s->row_box[r];
     if (!s->row_active[r] || b == last || s->boxes[b].depth == BOX_DEPTH || s->box_count * per_box > ROW_LIMIT)
       continue;
@@ -302,8 +295,11 @@ static batten_status allocate(rounds_state *s) {
   s->bowl = s->best + n;
   s->work = s->bowl + n;
   memset(s->cut_active, 0, n);
-  make_bowl(s->space, s->bowl);
-  return batten_qp_workspace_new(s->ctx, &s->workspace);
+  function_bowl(s->space, s->bowl);
+  batten_status st = batten_qp_workspace_new(s->ctx, &s->workspace);
+  if (st == BATTEN_OK) st = function_equalities(s->ctx, s->space, &s->cuts);
+  if (st == BATTEN_OK) st = grow_active(s, 0);
+  return st;
 }
 
 /* The minimum without inequalities; and the flattest spline that is allowed, to begin with. */

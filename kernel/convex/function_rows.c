@@ -13,6 +13,9 @@
  * reference that is feasible stays so), and two on either side of the direction of least curvature, the closer the
  * nearer it is to singular. So few directions are as good as very many fixed ones.
  *
+ * Where signs change, the Hessian vanishes, and the coefficients of another matrix take the place of H_rs: see
+ * make_divided_axis.
+ *
  * Necessary inequalities are z' H(x, y) z >= 0 at places, z the worst eigenvector. */
 #include <string.h>
 
@@ -22,37 +25,118 @@
 
 static const double half_turn = 3.14159265358979323846;
 
-void function_axis_rows(const bspline *b, size_t mu, double lower, double upper, double *rows) {
-  unsigned d = b->degree, order = d + 1;
-  for (unsigned k = 0; k < 3; k++) {
-    double *table = rows + k * order * order;
-    bspline_rows(b, mu, k, lower, upper, table);
-    for (unsigned degree = d - k; degree < d; degree++)
-      for (unsigned r = degree + 1; r + 1 > 0; r--) { /* in place: from the last to the first */
-        double part = (double)r / (degree + 1);
-        for (unsigned j = 0; j < order; j++)
-          table[r * order + j] =
-              (r ? part * table[(r - 1) * order + j] : 0) + (r <= degree ? (1 - part) * table[r * order + j] : 0);
-        if (r == 0) break;
-      }
+/* Rows of a polynomial of degree n become those of degree n + 1: combinations of `order` numbers, in place. */
+static void raise_rows(unsigned n, size_t order, double *rows) {
+  for (unsigned r = n + 2; r-- > 0;) { /* from the last to the first: what is read is not yet written */
+    double part = (double)r / (n + 1);
+    for (size_t j = 0; j < order; j++)
+      rows[r * order + j] =
+          (r > 0 ? part * rows[(r - 1) * order + j] : 0) + (r <= n ? (1 - part) * rows[r * order + j] : 0);
   }
+}
+
+/* Divides a polynomial of degree n with a zero of order m at 0 (side 0) or at 1 by t^m or (1 - t)^m. */
+static void divide_rows(unsigned n, unsigned m, int side, size_t order, double *rows) {
+  for (unsigned k = 0; k + m <= n; k++) {
+    unsigned from = side == 0 ? k + m : k;
+    double factor = bezier_binomial[n][from] / bezier_binomial[n - m][k];
+    for (size_t j = 0; j < order; j++) rows[k * order + j] = factor * rows[from * order + j];
+  }
+}
+
+/* From [0, 1] to [lower, upper] in it, by blossoms; work [n + 1][order]. */
+static void restrict_rows(unsigned n, double lower, double upper, size_t order, double *rows, double *work) {
+  double out[FUNCTION_TABLE];
+  for (unsigned i = 0; i <= n; i++) {
+    memcpy(work, rows, (n + 1) * order * sizeof *work);
+    for (unsigned round = 1; round <= n; round++) {
+      double t = round <= n - i ? lower : upper;
+      for (unsigned p = 0; p + round <= n; p++)
+        for (size_t j = 0; j < order; j++)
+          work[p * order + j] = (1 - t) * work[p * order + j] + t * work[(p + 1) * order + j];
+    }
+    memcpy(out + i * order, work, order * sizeof *out);
+  }
+  memcpy(rows, out, (n + 1) * order * sizeof *rows);
+}
+
+/* True when the neighbour across this side of a span pair has the opposite sign. */
+static bool line_at(const function_space *space, const uint32_t span[2], int axis, int side) {
+  uint32_t other[2] = {span[0], span[1]};
+  if (side == 0 ? other[axis] == 0 : other[axis] + 1 == space->spans[axis]) return false;
+  other[axis] += side == 0 ? UINT32_MAX : 1;
+  return function_sign(space, span) * function_sign(space, other) < 0;
 }
 
 typedef struct box_tables {
-  size_t first[2]; /* of the coefficients that live there */
-  double rows[2][3 * FUNCTION_TABLE];
+  size_t first[2];                    /* of the coefficients that live there */
+  size_t count[2];                    /* of Bernstein coefficients */
+  double rows[2][3 * FUNCTION_TABLE]; /* [derivative][count][degree + 1], all of one degree */
 } box_tables;
 
-static void make_tables(const function_space *space, const function_box *box, box_tables *t) {
-  for (int i = 0; i < 2; i++) {
-    const bspline *b = &space->spline.axis[i];
-    size_t mu = space->span[i][box->span[i]];
-    t->first[i] = mu - b->degree;
-    function_axis_rows(b, mu, box->lower[i], box->upper[i], t->rows[i]);
+static void make_axis(const bspline *b, size_t mu, double lower, double upper, int i, box_tables *t) {
+  unsigned d = b->degree;
+  size_t order = d + 1;
+  t->first[i] = mu - d;
+  t->count[i] = order;
+  for (unsigned k = 0; k < 3; k++) {
+    double *rows = t->rows[i] + k * order * order;
+    bspline_rows(b, mu, k, lower, upper, rows);
+    for (unsigned n = d - k; n < d; n++) raise_rows(n, order, rows);
   }
 }
 
-/* out [n_0][n_1][3] = the three products of derivatives (2, 0), (1, 1), (0, 2) of local coefficients [n_0][n_1]. */
+static void make_tables(const function_space *space, const function_box *box, box_tables *t) {
+  for (int i = 0; i < 2; i++)
+    make_axis(&space->spline.axis[i], space->span[i][box->span[i]], box->lower[i], box->upper[i], i, t);
+}
+
+/* A span at an end of which the sign changes: there the spline is linear along the line, its slope across is
+ * constant, and with C^2 its second derivative across vanishes, too. So, with t the distance from it, f_tt, f_ts,
+ * f_ss have zeros there of orders m - 2, m - 1, m, with m = 3 (C^1: 2), and H = t^(m - 2) diag(1, t) G diag(1, t): it
+ * is semidefinite where G = (f_tt / t^(m - 2), f_ts / t^(m - 1), f_ss / t^m) is. G need not vanish anywhere, while
+ * the coefficients of H next to the line always do, and would not let it change along it. */
+static void make_divided_axis(const function_space *space, const function_box *box, int i, const bool line[2],
+                              box_tables *t) {
+  const bspline *b = &space->spline.axis[i];
+  size_t mu = space->span[i][box->span[i]], order = b->degree + 1;
+  double begin = b->knots[mu], length = b->knots[mu + 1] - begin, work[FUNCTION_TABLE];
+  int degree[3], most = -1;
+  t->first[i] = mu - b->degree;
+  for (unsigned k = 0; k < 3; k++) {
+    double *rows = t->rows[i] + k * order * order;
+    unsigned zeros = (space->smoothness[i] >= 2 ? 3 : 2) - k;
+    degree[k] = (int)(b->degree - k);
+    bspline_rows(b, mu, k, begin, b->knots[mu + 1], rows);
+    for (int side = 0; side < 2; side++) {
+      if (!line[side] || degree[k] < 0) continue;
+      if (degree[k] >= (int)zeros) divide_rows((unsigned)degree[k], zeros, side, order, rows);
+      degree[k] -= (int)zeros; /* below 0: nothing but 0 has so many zeros */
+    }
+    if (degree[k] > most) most = degree[k];
+  }
+  t->count[i] = (size_t)(most + 1);
+  for (unsigned k = 0; k < 3 && most >= 0; k++) {
+    double *rows = t->rows[i] + k * order * order;
+    if (degree[k] < 0) memset(rows, 0, order * order * sizeof *rows);
+    for (int n = degree[k]; n >= 0 && n < most; n++) raise_rows((unsigned)n, order, rows);
+    restrict_rows((unsigned)most, (box->lower[i] - begin) / length, (box->upper[i] - begin) / length, order, rows,
+                  work);
+  }
+}
+
+/* As make_tables, but of G along the first axis across which the sign changes. */
+static void make_divided_tables(const function_space *space, const function_box *box, box_tables *t) {
+  make_tables(space, box, t);
+  for (int i = 0; i < 2; i++) {
+    bool line[2] = {line_at(space, box->span, i, 0), line_at(space, box->span, i, 1)};
+    if (!line[0] && !line[1]) continue;
+    make_divided_axis(space, box, i, line, t);
+    return;
+  }
+}
+
+/* out [count_0][count_1][3]: f_xx, f_xy, f_yy. */
 static void apply_tables(const function_space *space, const box_tables *t, const double *x, double *out) {
   size_t n0 = space->spline.axis[0].degree + 1, n1 = space->spline.axis[1].degree + 1;
   size_t stride = space->spline.axis[1].count;
@@ -60,17 +144,17 @@ static void apply_tables(const function_space *space, const box_tables *t, const
   for (unsigned k = 0; k < 3; k++) {
     const double *u = t->rows[0] + (2 - k) * n0 * n0, *v = t->rows[1] + k * n1 * n1;
     for (size_t i = 0; i < n0; i++)
-      for (size_t s = 0; s < n1; s++) {
+      for (size_t s = 0; s < t->count[1]; s++) {
         const double *c = x + (t->first[0] + i) * stride + t->first[1];
         double sum = 0;
         for (size_t j = 0; j < n1; j++) sum += v[s * n1 + j] * c[j];
         half[i * n1 + s] = sum;
       }
-    for (size_t r = 0; r < n0; r++)
-      for (size_t s = 0; s < n1; s++) {
+    for (size_t r = 0; r < t->count[0]; r++)
+      for (size_t s = 0; s < t->count[1]; s++) {
         double sum = 0;
         for (size_t i = 0; i < n0; i++) sum += u[r * n0 + i] * half[i * n1 + s];
-        out[(r * n1 + s) * 3 + k] = sum;
+        out[(r * t->count[1] + s) * 3 + k] = sum;
       }
   }
 }
@@ -122,6 +206,23 @@ void function_eigen(const double h[3], double values[2], double *angle) {
   if (angle) *angle = radius > 0 ? atan2(h[1], off) / 2 : 0;
 }
 
+/* The blossom of t^2 is the mean of products of pairs. */
+void function_bowl(const function_space *space, double *out) {
+  const bspline *b = space->spline.axis;
+  for (size_t k = 0; k < space->n; k++) {
+    size_t at[2] = {k / b[1].count, k % b[1].count};
+    out[k] = 0;
+    for (int i = 0; i < 2; i++) {
+      const double *knots = b[i].knots + at[i] + 1;
+      double sum = 0;
+      unsigned d = b[i].degree;
+      for (unsigned p = 0; p < d; p++)
+        for (unsigned q = p + 1; q < d; q++) sum += knots[p] * knots[q];
+      out[k] += sum / (d * (d - 1)); /* half of the mean over d (d - 1) / 2 pairs */
+    }
+  }
+}
+
 /* ---- sufficient inequalities --------------------------------------------------------------------- */
 
 enum { DIRECTIONS_MAX = 16 };
@@ -168,27 +269,33 @@ static unsigned choose_directions(const function_directions *opt, const double h
   return count;
 }
 
-/* One row: the part of H_rs along z_a, z_b, times the sign, of length 1. */
-static void append_row(const function_space *space, const box_tables *t, size_t r, size_t s, const double part[3],
-                       double lower, function_matrix *rows) {
-  size_t n0 = space->spline.axis[0].degree + 1, n1 = space->spline.axis[1].degree + 1;
-  size_t stride = space->spline.axis[1].count, begin = rows->starts[rows->rows], at = begin;
-  const double *u = t->rows[0] + r * n0, *v = t->rows[1] + s * n1;
+/* Ends the row whose `used` entries have been written behind the others: to length 1, nothing when that is 0. */
+static void finish_row(function_matrix *rows, size_t used, double lower, double upper) {
+  size_t begin = rows->starts[rows->rows];
   double square = 0;
-  for (size_t i = 0; i < n0; i++)
-    for (size_t j = 0; j < n1; j++) {
-      double value = part[0] * u[2 * n0 * n0 + i] * v[j] + part[1] * u[n0 * n0 + i] * v[n1 * n1 + j] +
-                     part[2] * u[i] * v[2 * n1 * n1 + j];
-      if (value == 0) continue;
-      rows->indices[at] = (uint32_t)((t->first[0] + i) * stride + t->first[1] + j);
-      rows->values[at++] = value;
-      square += value * value;
-    }
+  for (size_t k = begin; k < begin + used; k++) square += rows->values[k] * rows->values[k];
   if (!(square > 0)) return;
   double scale = 1 / sqrt(square);
-  for (size_t k = begin; k < at; k++) rows->values[k] *= scale;
-  rows->lower[rows->rows++] = lower * scale;
-  rows->starts[rows->rows] = at;
+  for (size_t k = begin; k < begin + used; k++) rows->values[k] *= scale;
+  rows->lower[rows->rows] = lower * scale;
+  rows->upper[rows->rows++] = upper * scale;
+  rows->starts[rows->rows] = begin + used;
+}
+
+/* part[0] u_2 (x) v_0 + part[1] u_1 (x) v_1 + part[2] u_0 (x) v_2 of rows u [3] and v [3] of one variable. */
+static void append_row(const function_space *space, const size_t first[2], const double *const *u,
+                       const double *const *v, const double part[3], double lower, double upper,
+                       function_matrix *rows) {
+  size_t n0 = space->spline.axis[0].degree + 1, n1 = space->spline.axis[1].degree + 1;
+  size_t stride = space->spline.axis[1].count, begin = rows->starts[rows->rows], used = 0;
+  for (size_t i = 0; i < n0; i++)
+    for (size_t j = 0; j < n1; j++) {
+      double value = part[0] * u[2][i] * v[0][j] + part[1] * u[1][i] * v[1][j] + part[2] * u[0][i] * v[2][j];
+      if (value == 0) continue;
+      rows->indices[begin + used] = (uint32_t)((first[0] + i) * stride + first[1] + j);
+      rows->values[begin + used++] = value;
+    }
+  finish_row(rows, used, lower, upper);
 }
 
 batten_status function_rows_box(batten_context *ctx, const function_space *space, const function_box *box,
@@ -199,15 +306,20 @@ batten_status function_rows_box(batten_context *ctx, const function_space *space
   box_tables t;
   batten_status st = function_matrix_reserve(ctx, rows, points * DIRECTIONS_MAX, points * points * DIRECTIONS_MAX);
   if (st < 0) return st;
-  make_tables(space, box, &t);
+  make_divided_tables(space, box, &t);
   apply_tables(space, &t, reference, h[0]);
   if (other) apply_tables(space, &t, other, h[1]);
   for (int which = 0; which < (other ? 2 : 1); which++)
-    for (size_t k = 0; k < 3 * points; k++) h[which][k] *= sign;
-  for (size_t r = 0; r < n0; r++)
-    for (size_t s = 0; s < n1; s++) {
+    for (size_t k = 0; k < 3 * t.count[0] * t.count[1]; k++) h[which][k] *= sign;
+  for (size_t r = 0; r < t.count[0]; r++)
+    for (size_t s = 0; s < t.count[1]; s++) {
       double angles[DIRECTIONS_MAX];
-      size_t at = 3 * (r * n1 + s);
+      const double *u[3], *v[3];
+      for (size_t k = 0; k < 3; k++) {
+        u[k] = t.rows[0] + (k * n0 + r) * n0;
+        v[k] = t.rows[1] + (k * n1 + s) * n1;
+      }
+      size_t at = 3 * (r * t.count[1] + s);
       unsigned count = choose_directions(opt, h[0] + at, other ? h[1] + at : NULL, scale, angles);
       for (unsigned a = 0; a < count; a++) {
         bool last = a + 1 == count;
@@ -215,7 +327,7 @@ batten_status function_rows_box(batten_context *ctx, const function_space *space
         double z[2][2] = {{cos(from), sin(from)}, {cos(to), sin(to)}};
         double part[3] = {sign * z[0][0] * z[1][0], sign * (z[0][0] * z[1][1] + z[0][1] * z[1][0]),
                           sign * z[0][1] * z[1][1]};
-        append_row(space, &t, r, s, part, opt->margin * cos(to - from), rows);
+        append_row(space, t.first, u, v, part, opt->margin * cos(to - from), INFINITY, rows);
       }
     }
   return BATTEN_OK;
@@ -226,24 +338,61 @@ batten_status function_rows_box(batten_context *ctx, const function_space *space
 static void append_cut(const function_space *space, const uint32_t span[2], const double place[2], const double z[2],
                        function_matrix *cuts) {
   place_tables t;
-  size_t n0 = space->spline.axis[0].degree + 1, n1 = space->spline.axis[1].degree + 1;
-  size_t stride = space->spline.axis[1].count, begin = cuts->starts[cuts->rows], at = begin;
-  double sign = function_sign(space, span), square = 0;
+  double sign = function_sign(space, span),
+         part[3] = {sign * z[0] * z[0], 2 * sign * z[0] * z[1], sign * z[1] * z[1]};
+  const double *u[3], *v[3];
   make_place(space, span, place, &t);
-  for (size_t i = 0; i < n0; i++)
-    for (size_t j = 0; j < n1; j++) {
-      const double *u = t.basis[0] + i, *v = t.basis[1] + j;
-      double value =
-          sign * (z[0] * z[0] * u[2 * n0] * v[0] + 2 * z[0] * z[1] * u[n0] * v[n1] + z[1] * z[1] * u[0] * v[2 * n1]);
-      if (value == 0) continue;
-      cuts->indices[at] = (uint32_t)((t.first[0] + i) * stride + t.first[1] + j);
-      cuts->values[at++] = value;
-      square += value * value;
+  for (size_t k = 0; k < 3; k++) {
+    u[k] = t.basis[0] + k * (space->spline.axis[0].degree + 1);
+    v[k] = t.basis[1] + k * (space->spline.axis[1].degree + 1);
+  }
+  append_row(space, t.first, u, v, part, 0, INFINITY, cuts);
+}
+
+/* Where the sign changes across the upper side of a span pair in direction `axis`. Coefficients along the line that
+ * the pair before, if it has this line, too, shares by continuity are left out. */
+static void append_equalities(const function_space *space, const uint32_t span[2], int axis, function_matrix *rows) {
+  int along = 1 - axis;
+  const bspline *b[2] = {&space->spline.axis[0], &space->spline.axis[1]};
+  uint32_t before[2] = {span[0], span[1]};
+  bool goes_on = span[along] > 0;
+  if (goes_on) before[along]--;
+  goes_on = goes_on && line_at(space, before, axis, 1);
+  double natural[2][3][FUNCTION_TABLE];
+  size_t mu[2], first[2];
+  for (int i = 0; i < 2; i++) {
+    mu[i] = space->span[i][span[i]];
+    first[i] = mu[i] - b[i]->degree;
+    for (unsigned k = 0; k < 3; k++)
+      bspline_rows(b[i], mu[i], k, b[i]->knots[mu[i]], b[i]->knots[mu[i] + 1], natural[i][k]);
+  }
+  for (unsigned k = 0; k < (space->smoothness[axis] >= 2 ? 3u : 2u); k++) { /* k across, 2 - k along */
+    size_t skip = goes_on ? space->smoothness[along] - 1 + k : 0, order[2] = {b[0]->degree + 1, b[1]->degree + 1};
+    for (size_t s = skip; s < order[along] - 2 + k; s++) {
+      const double *u[2][3];
+      double part[3] = {0};
+      for (unsigned l = 0; l < 3; l++) {
+        u[axis][l] = natural[axis][k] + (order[axis] - 1 - k) * order[axis];
+        u[along][l] = natural[along][2 - k] + s * order[along];
+      }
+      part[axis == 0 ? 2 - k : k] = 1;
+      append_row(space, first, u[0], u[1], part, 0, 0, rows);
     }
-  if (!(square > 0)) return;
-  for (size_t k = begin; k < at; k++) cuts->values[k] /= sqrt(square);
-  cuts->lower[cuts->rows++] = 0;
-  cuts->starts[cuts->rows] = at;
+  }
+}
+
+batten_status function_equalities(batten_context *ctx, const function_space *space, function_matrix *rows) {
+  size_t points = (space->spline.axis[0].degree + 1) * (size_t)(space->spline.axis[1].degree + 1);
+  for (uint32_t i = 0; i < space->spans[0]; i++)
+    for (uint32_t j = 0; j < space->spans[1]; j++)
+      for (int axis = 0; axis < 2; axis++) {
+        uint32_t span[2] = {i, j};
+        if (!line_at(space, span, axis, 1)) continue;
+        batten_status st = function_matrix_reserve(ctx, rows, 3 * FUNCTION_ORDER, 3 * FUNCTION_ORDER * points);
+        if (st < 0) return st;
+        append_equalities(space, span, axis, rows);
+      }
+  return BATTEN_OK;
 }
 
 /* The least signed eigenvalue at a place, and its direction. */

@@ -15,6 +15,7 @@ void function_matrix_free(batten_context *ctx, function_matrix *m) {
   batten_free(ctx, m->indices);
   batten_free(ctx, m->values);
   batten_free(ctx, m->lower);
+  batten_free(ctx, m->upper);
   *m = (function_matrix){0};
 }
 
@@ -32,6 +33,9 @@ batten_status function_matrix_reserve(batten_context *ctx, function_matrix *m, s
     double *lower = batten_realloc_array(ctx, m->lower, room, sizeof *lower);
     if (!lower) return BATTEN_E_NOMEM;
     m->lower = lower;
+    double *upper = batten_realloc_array(ctx, m->upper, room, sizeof *upper);
+    if (!upper) return BATTEN_E_NOMEM;
+    m->upper = upper;
     m->row_room = room;
   }
   if (!m->indices || need_entries > m->entry_room) {
