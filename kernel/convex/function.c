@@ -37,6 +37,7 @@ typedef struct function_fit {
   double *scaled, *weights;   /* [count][3], [count] of sum 1 */
   double plane[3];            /* of z sign scale: plane[0] + plane[1] x + plane[2] y, x and y scaled */
   double scale, total_weight; /* of z: power of two */
+  bool flat;                  /* all z are on a plane */
   double noise;               /* largest |z| before the plane was taken off, scaled */
   double *x, *unconstrained;  /* [n] */
   double *points_of;          /* [n][3] control points */
@@ -270,6 +271,7 @@ static batten_status scale_points(function_fit *f) {
   for (int i = 0; i < 3; i++) f->plane[i] *= unit;
   f->scale *= unit;
   f->noise = size * unit;
+  f->flat = flat;
   return BATTEN_OK;
 }
 
@@ -345,29 +347,49 @@ static void gauss_range(const function_fit *f, const batten_surface *surface, do
     }
 }
 
-/* The proof. Where nothing strict can be had: slack, from what is known of the least eigenvalue, and more if that is
- * not enough. */
-static batten_status prove(function_fit *f, const batten_surface *surface, const function_rounds_info *rounds,
+/* Proves with ever more slack. From a ten millionth of the curvature: with less, rounding of products of curvature
+ * and slack is above the square of the slack. Where an attempt with little slack needs many boxes, the next needs
+ * few. */
+static batten_status prove_slack(function_fit *f, const function_rounds_info *rounds, const batten_surface *surface,
+                                 batten_convexity_options *o, batten_convex_function_info *info) {
+  double width = fmin(f->domain[0][1] - f->domain[0][0], f->domain[1][1] - f->domain[1][0]);
+  batten_status st = BATTEN_OK;
+  o->slack = fmax(-2 * rounds->margin, 1e-7 * rounds->scale) / (f->scale * width * width);
+  o->box_limit = 20000;
+  for (int attempt = 0; attempt < 12 && st == BATTEN_OK; attempt++) {
+    st = batten_surface_certify_convex(f->ctx, surface, o, &info->convexity);
+    info->slack = o->slack;
+    if (info->convexity.certified) break;
+    o->slack *= 2;
+  }
+  return st;
+}
+
+/* Makes the surface and proves it. Where the margin, which is above the rounding of second derivatives, is not above
+ * that of the proof, as for data on a plane: with more margin. */
+static batten_status prove(function_fit *f, const function_rounds_info *rounds, batten_surface **surface,
                            batten_convex_function_info *info) {
   batten_convexity_options o = batten_convexity_options_default();
-  signed char *signs = batten_alloc(f->ctx, f->space.spans[0] * f->space.spans[1]);
+  size_t spans = f->space.spans[0] * f->space.spans[1];
+  double *bowl = f->unconstrained; /* no longer needed */
+  signed char *signs = batten_alloc(f->ctx, spans);
   if (!signs) return BATTEN_E_NOMEM;
-  for (size_t k = 0; k < f->space.spans[0] * f->space.spans[1]; k++)
-    signs[k] = (signed char)(f->signs[k] * (int)f->sign);
+  for (size_t k = 0; k < spans; k++) signs[k] = (signed char)(f->signs[k] * (int)f->sign);
   o.signs = signs;
-  double width = fmin(f->domain[0][1] - f->domain[0][0], f->domain[1][1] - f->domain[1][0]);
-  double unit = 1 / (f->scale * width * width);
+  function_bowl(&f->space, bowl);
   batten_status st = BATTEN_OK;
-  /* From a millionth of the curvature: with less, rounding of its product with the slack is above the slack's square.
-   * Where one attempt needs many boxes, the next one needs few. */
-  if (f->space.opposite) o.slack = fmax(2 * -rounds->margin, 1e-7 * rounds->scale) * unit;
-  for (int attempt = 0; attempt < 12 && st == BATTEN_OK; attempt++) {
-    if (f->space.opposite) o.box_limit = 20000;
-    st = batten_surface_certify_convex(f->ctx, surface, &o, &info->convexity);
-    if (info->convexity.certified || !f->space.opposite) break;
-    o.slack *= 2;
+  double more = 15 * rounds->least_margin;
+  for (int attempt = 0; attempt < 5 && st == BATTEN_OK; attempt++, more *= 16) {
+    for (size_t k = 0; k < f->space.n && attempt > 0; k++) f->x[k] += more * bowl[k];
+    batten_surface_free(*surface);
+    *surface = NULL;
+    st = make_surface(f, f->x, surface, &info->lsq, &info->max_error, &info->max_error_index);
+    if (st == BATTEN_OK && f->space.opposite) st = prove_slack(f, rounds, *surface, &o, info);
+    if (!f->space.opposite) o.box_limit = 200000;
+    if (st == BATTEN_OK && !f->space.opposite)
+      st = batten_surface_certify_convex(f->ctx, *surface, &o, &info->convexity);
+    if (info->convexity.certified || f->space.opposite) break;
   }
-  info->slack = o.slack;
   batten_free(f->ctx, signs);
   return st;
 }
@@ -442,19 +464,20 @@ batten_status batten_convex_function_fit(batten_context *ctx, size_t count, cons
   double fine = 0;
   for (int i = 0; i < 2; i++) fine = fmax(fine, (double)(f.space.spans[i] * f.opt.degree[i]));
   double noise = 256 * DBL_EPSILON * f.noise * fine * fine; /* of second differences of coefficients */
+  /* Of data on a plane nothing is left: a hundred millionth of their size is as good, and easy to prove. */
+  if (f.flat) noise = fmax(noise, 1e-8 * f.noise);
   function_rounds_options how = {f.opt.rounds, f.opt.gap_tol, floor_of_squares, noise, false};
   st = function_rounds(ctx, &f.space, &terms, &how, f.x, f.unconstrained, &rounds);
   if (st < 0) goto done;
   double error, gauss;
   size_t index;
   st = make_surface(&f, f.unconstrained, &free_surface, &found.lsq_unconstrained, &error, &index);
-  if (st == BATTEN_OK) st = make_surface(&f, f.x, &surface, &found.lsq, &found.max_error, &found.max_error_index);
   if (st < 0) goto done;
   double begin = batten_now();
   gauss_range(&f, free_surface, &found.gauss_min_unconstrained, &gauss);
-  gauss_range(&f, surface, &found.gauss_min, &found.gauss_max);
-  st = prove(&f, surface, &rounds, &found);
+  st = prove(&f, &rounds, &surface, &found);
   if (st < 0) goto done;
+  gauss_range(&f, surface, &found.gauss_min, &found.gauss_max);
   found.time_check_s = batten_now() - begin;
   fill_info(&f, &rounds, &found);
   st = judge(&f, &found, how.floor);

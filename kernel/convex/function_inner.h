@@ -113,9 +113,10 @@ typedef struct function_rounds_info {
   double upper[FUNCTION_ROUNDS_MAX]; /* objectives after each round */
   double lower, squares_lower;
   double objective;
-  double margin; /* proven: the least eigenvalue, negative = slack is needed */
-  double scale;  /* of second derivatives */
-  bool free;     /* the unconstrained spline is the result */
+  double margin;       /* proven: the least eigenvalue, negative = slack is needed */
+  double scale;        /* of second derivatives */
+  double least_margin; /* that was asked for */
+  bool free;           /* the unconstrained spline is the result */
   double time_rows, time_qp;
 } function_rounds_info;
 

@@ -11,8 +11,6 @@
  * less `margin` times the identity is to be semidefinite, so that convexity is strict. Where opposite signs touch the
  * Hessian vanishes, and nothing strict can be had. */
 #include <string.h>
-#include <stdio.h>
-#include <stdlib.h>
 
 #include "base/checked.h"
 #include "function_inner.h"
@@ -62,16 +60,15 @@ static batten_status minimise(rounds_state *s, const function_matrix *rows, bool
   }
   o.x0 = start;
   o.active = active_start;
+  if (s->space->opposite && rows == &s->cuts) { /* nearly parallel cuts where signs meet: thousands of pivots */
+    o.engine = BATTEN_QP_INTERIOR;
+    o.hand_over = 0;
+  }
   batten_qp_solution out = {.x = x, .active = active};
   batten_qp_info info;
   double begin = batten_now();
   batten_status st = batten_qp_solve(s->ctx, &p, &o, s->workspace, &out, &info);
   s->info->time_qp += batten_now() - begin;
-  if (getenv("DBG"))
-    fprintf(stderr, "qp %s rows %zu used %zu eng %d it %zu t %.3f obj %.9g gap %.2g pr %.2g dr %.2g prox %zu %s\n",
-            batten_status_name(st), rows ? rows->rows : 0, info.rows_used, info.engine, info.iterations, info.time_s,
-            2 * info.objective, info.duality_gap, info.primal_residual, info.dual_residual, info.proximal_steps,
-            st ? batten_error(s->ctx) : "");
   *bound = -INFINITY;
   *solved = st == BATTEN_OK || st == BATTEN_W_ACCURACY;
   if (st == BATTEN_OK) *bound = 2 * (info.objective - fabs(info.duality_gap));
@@ -135,7 +132,8 @@ static batten_status grow_active(rounds_state *s, size_t rows_before) {
 
 static batten_status from_below(rounds_state *s, unsigned round) {
   size_t n = s->space->n;
-  double tolerance = s->scale * pow(0.1, 3 + round);
+  /* Where a bowl makes it convex, cuts go on until that costs little; else to ever less curvature. */
+  double tolerance = s->scale * (s->space->opposite || s->opt->rows_only ? pow(0.1, 3 + round) : 1e-6);
   for (unsigned step = 0; step < CUT_STEPS; step++) {
     double worst, bound, begin = batten_now();
     size_t before = s->cuts.rows;
@@ -355,6 +353,7 @@ batten_status function_rounds(batten_context *ctx, const function_space *space, 
     info->lower = s.lower;
     info->cuts = s.cuts.rows;
     info->scale = s.scale;
+    info->least_margin = s.margin;
   }
   batten_qp_workspace_free(s.workspace);
   function_matrix_free(ctx, &s.cuts);
