@@ -347,6 +347,41 @@ static void gauss_range(const function_fit *f, const batten_surface *surface, do
     }
 }
 
+/* The certificate, of the surface with z multiplied by a power of two that makes it about as high as wide: what is
+ * proven of that holds of the surface, with another margin. K = D / (1 + g^2)^2, g the slope: with z times q it is
+ * q^2 D / (1 + q^2 g^2)^2, so that K is at least min(q, 1 / q)^2 of that. */
+static batten_status certify(function_fit *f, const batten_surface *surface, const batten_convexity_options *opt,
+                             batten_convexity *out) {
+  batten_surface_form form = batten_surface_get(surface);
+  batten_convexity_options o = *opt;
+  batten_surface *copy = NULL;
+  double low = INFINITY, high = -INFINITY;
+  for (size_t k = 0; k < f->space.n; k++) {
+    low = fmin(low, form.control_points[3 * k + 2]);
+    high = fmax(high, form.control_points[3 * k + 2]);
+  }
+  double wide = fmax(f->domain[0][1] - f->domain[0][0], f->domain[1][1] - f->domain[1][0]);
+  double factor = high > low && isfinite(high - low) ? batten_unit(high - low) / batten_unit(wide) : 1;
+  for (size_t k = 0; k < f->space.n; k++) {
+    memcpy(f->points_of + 3 * k, form.control_points + 3 * k, 2 * sizeof(double));
+    f->points_of[3 * k + 2] = factor * form.control_points[3 * k + 2];
+  }
+  form.control_points = f->points_of;
+  o.slack *= factor;
+  batten_status st = batten_surface_create(f->ctx, &form, &copy);
+  if (st == BATTEN_OK) st = batten_surface_certify_convex(f->ctx, copy, &o, out);
+  if (st == BATTEN_OK) {
+    double least = fmin(factor, 1 / factor);
+    out->margin_min *= out->certified ? least * least : 1;
+    if (out->graph) { /* of any function */
+      const double up[3] = {0, 0, 1};
+      memcpy(out->direction, up, sizeof up);
+    }
+  }
+  batten_surface_free(copy);
+  return st;
+}
+
 /* Proves with ever more slack. From a ten millionth of the curvature: with less, rounding of products of curvature
  * and slack is above the square of the slack. Where an attempt with little slack needs many boxes, the next needs
  * few. */
@@ -357,7 +392,7 @@ static batten_status prove_slack(function_fit *f, const function_rounds_info *ro
   o->slack = fmax(-2 * rounds->margin, 1e-7 * rounds->scale) / (f->scale * width * width);
   o->box_limit = 20000;
   for (int attempt = 0; attempt < 12 && st == BATTEN_OK; attempt++) {
-    st = batten_surface_certify_convex(f->ctx, surface, o, &info->convexity);
+    st = certify(f, surface, o, &info->convexity);
     info->slack = o->slack;
     if (info->convexity.certified) break;
     o->slack *= 2;
@@ -386,8 +421,7 @@ static batten_status prove(function_fit *f, const function_rounds_info *rounds, 
     st = make_surface(f, f->x, surface, &info->lsq, &info->max_error, &info->max_error_index);
     if (st == BATTEN_OK && f->space.opposite) st = prove_slack(f, rounds, *surface, &o, info);
     if (!f->space.opposite) o.box_limit = 200000;
-    if (st == BATTEN_OK && !f->space.opposite)
-      st = batten_surface_certify_convex(f->ctx, *surface, &o, &info->convexity);
+    if (st == BATTEN_OK && !f->space.opposite) st = certify(f, *surface, &o, &info->convexity);
     if (info->convexity.certified || f->space.opposite) break;
   }
   batten_free(f->ctx, signs);

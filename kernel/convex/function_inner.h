@@ -65,9 +65,6 @@ static inline int function_sign(const function_space *space, const uint32_t span
 
 /* Bernstein coefficients of the Hessian on a box: out [d_0 + 1][d_1 + 1][3]. */
 void function_hessian_box(const function_space *space, const function_box *box, const double *x, double *out);
-/* The Hessian at a place of a span pair. */
-void function_hessian_at(const function_space *space, const uint32_t span[2], const double place[2], const double *x,
-                         double out[3]);
 /* Coefficients [n] of (x^2 + y^2) / 2, whose Hessian is the identity. */
 void function_bowl(const function_space *space, double *out);
 /* Eigenvalues, the larger first, and the angle of its direction; 0 for multiples of the identity. */

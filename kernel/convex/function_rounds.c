@@ -323,9 +323,9 @@ static batten_status start(rounds_state *s, double *unconstrained) {
   double least;
   st = function_least(s->ctx, s->space, s->outer, s->margin / 2, LEAST_BOXES, &least);
   if (st < 0 || least < s->margin / 2) return st;
-  s->info->free = true;
+  s->info->free = true; /* a minimum of all splines */
   s->info->margin = least;
-  s->objective = objective_of(s, s->outer);
+  s->objective = s->lower = objective_of(s, s->outer);
   memcpy(s->best, s->outer, n * sizeof *s->best);
   return BATTEN_OK;
 }

@@ -170,12 +170,28 @@ typedef struct place_tables {
   double basis[2][3 * BSPLINE_ORDER]; /* [derivative][degree + 1] */
 } place_tables;
 
+/* Where the sign changes across a side of the span pair: of G, which is then what is to be semidefinite, also on the
+ * line itself. The Bernstein coefficients on a point are all the value there. */
 static void make_place(const function_space *space, const uint32_t span[2], const double place[2], place_tables *t) {
-  for (int i = 0; i < 2; i++) {
+  bool divided = false;
+  for (int side = 0; side < 4 && space->opposite; side++)
+    divided = divided || line_at(space, span, side / 2, side % 2);
+  for (int i = 0; i < 2 && !divided; i++) {
     const bspline *b = &space->spline.axis[i];
     size_t mu = space->span[i][span[i]];
     t->first[i] = mu - b->degree;
     bspline_basis(b, mu, place[i], 2, t->basis[i]);
+  }
+  if (!divided) return;
+  function_box box = {.span = {span[0], span[1]}, .lower = {place[0], place[1]}, .upper = {place[0], place[1]}};
+  box_tables tables;
+  make_divided_tables(space, &box, &tables);
+  for (int i = 0; i < 2; i++) {
+    size_t order = space->spline.axis[i].degree + 1;
+    t->first[i] = tables.first[i];
+    for (size_t k = 0; k < 3; k++)
+      for (size_t j = 0; j < order; j++)
+        t->basis[i][k * order + j] = tables.count[i] > 0 ? tables.rows[i][k * order * order + j] : 0;
   }
 }
 
@@ -190,13 +206,6 @@ static void place_hessian(const function_space *space, const place_tables *t, co
       for (size_t k = 0; k < 3; k++) sum[k] += t->basis[1][k * n1 + j] * c[j];
     for (size_t k = 0; k < 3; k++) out[k] += t->basis[0][(2 - k) * n0 + i] * sum[k];
   }
-}
-
-void function_hessian_at(const function_space *space, const uint32_t span[2], const double place[2], const double *x,
-                         double out[3]) {
-  place_tables t;
-  make_place(space, span, place, &t);
-  place_hessian(space, &t, x, out);
 }
 
 void function_eigen(const double h[3], double values[2], double *angle) {
@@ -399,7 +408,9 @@ batten_status function_equalities(batten_context *ctx, const function_space *spa
 static double least_at(const function_space *space, const uint32_t span[2], const double place[2], const double *x,
                        double z[2]) {
   double h[3], values[2], angle, sign = function_sign(space, span);
-  function_hessian_at(space, span, place, x, h);
+  place_tables t;
+  make_place(space, span, place, &t);
+  place_hessian(space, &t, x, h);
   for (int k = 0; k < 3; k++) h[k] *= sign;
   function_eigen(h, values, &angle);
   z[0] = -sin(angle);

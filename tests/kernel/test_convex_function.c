@@ -86,7 +86,7 @@ static void exact_quadratic(batten_context *ctx) {
   T_RATIO(fabs(p.point[2] - bowl(0.3, -0.7)), 1e-12, "value between points");
   T_RATIO(fabs(p.duu[2] - 4) + fabs(p.duv[2] - 1) + fabs(p.dvv[2] - 3), 1e-9, "second derivatives");
   /* det / (1 + f_x^2 + f_y^2)^2: largest where the slope vanishes */
-  T_RATIO(fabs(info.gauss_max - 11), 0.5, "Gaussian curvature at the bottom");
+  T_CHECK(info.gauss_max > 9 && info.gauss_max < 11 + 1e-9, "Gaussian curvature near the bottom: %g", info.gauss_max);
   batten_surface_free(s);
 }
 
@@ -111,8 +111,8 @@ static void fit(batten_context *ctx, const char *what, height f, double noise, s
     T_CHECK(least > 0, "all sampled Hessians are definite: %.3g", least);
   else
     T_RATIO(-least, info.slack, "sampled Hessians");
-  T_RATIO(fabs(sum - info.lsq), 1e-9 * info.lsq + 1e-24, "sum of squares by evaluation");
-  T_RATIO(fabs(squares(ctx, u, count, points) - info.lsq_unconstrained), 1e-9 * info.lsq_unconstrained + 1e-24,
+  T_RATIO(fabs(sum - info.lsq), 1e-9 * info.lsq + 1e-21, "sum of squares by evaluation");
+  T_RATIO(fabs(squares(ctx, u, count, points) - info.lsq_unconstrained), 1e-9 * info.lsq_unconstrained + 1e-21,
           "the same of the unconstrained");
   batten_surface_free(s);
   batten_surface_free(u);
