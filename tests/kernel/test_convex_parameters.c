@@ -269,6 +269,23 @@ static void test_caps(batten_context *ctx) {
   }
 }
 
+/* A tube of 45 radii, closed at its far end: that shrinks like exp(-45), below what parameters near 1/2 can tell. */
+static void test_deep(batten_context *ctx) {
+  scene s = cap(150, 8, 1);
+  for (size_t i = 1; i < s.count; i++) {
+    double turn = 2 * PI * (double)((i - 1) % 8) / 8;
+    s.points[3 * i] = cos(turn);
+    s.points[3 * i + 1] = sin(turn);
+    s.points[3 * i + 2] = -0.3 * (double)((i - 1) / 8);
+  }
+  double *uv = malloc(2 * s.count * sizeof *uv);
+  T_STATUS(parametrize(ctx, &s, BATTEN_PARAMETERS_FLOATER, uv), BATTEN_W_ACCURACY, ctx,
+           "the surface is too deep for one square");
+  T_CHECK(is_in_square(s.count, uv), "there are parameters all the same");
+  drop(&s);
+  free(uv);
+}
+
 static void test_floater_invariance(batten_context *ctx) {
   scene s = cap(6, 24, 2.0);
   uint64_t seed = 9;
@@ -516,6 +533,7 @@ int main(void) {
   test_project_invariance(ctx);
   test_planes(ctx);
   test_caps(ctx);
+  test_deep(ctx);
   test_floater_invariance(ctx);
   test_corners(ctx);
   test_flat_edges(ctx);
