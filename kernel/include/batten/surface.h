@@ -123,8 +123,8 @@ BATTEN_API batten_convexity_options batten_convexity_options_default(void);
 
 typedef struct batten_convexity {
   int certified;       /* non-zero: proven on every span pair of which it was asked */
-  int flat;            /* non-zero: all of L', M', N' vanish to rounding, that of the control points included: a plane,
-                          a line or a point, convex, but not strictly: certified is 0 (without slack) */
+  int flat;            /* non-zero: all of L', M', N' vanish to rounding, that of the control points included: a
+                          plane, a line or a point, convex, but not strictly: certified is 0 (without slack) */
   int sign;            /* of L' when certified and one sign was asked for: +1, -1; else 0 */
   double margin_min;   /* K is proven to be larger everywhere (with slack: (L' + slack)(N' + slack) - M'^2 over |x_u x
                           x_v|^4 is), 1 / unit^2: at least nine tenths of the least K, unless depth_max or box_limit
