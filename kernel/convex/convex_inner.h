@@ -60,6 +60,9 @@ void convex_rows_free(batten_context *ctx, convex_rows *rows);
 /* Gram matrix of the k-th derivatives of a space's functions over its domain: out [count][count]. Exact. */
 void convex_gram(const bspline *b, unsigned k, double *out);
 
+/* Control point i of t and of t^2, t = (parameter - mean) / reach. */
+void convex_quadratic(const bspline *b, size_t i, double mean, double reach, double out[2]);
+
 /* The sum over points of weight |x(u, v) - point|^2, of coordinates apart: `n` = convex_points. */
 typedef struct convex_objective {
   size_t n, count;
@@ -105,8 +108,9 @@ typedef struct convex_reference {
   double *control; /* [n][3] the caller's memory */
   double weight;   /* w, beside the sum; INFINITY = the limit */
   unsigned steps;  /* doublings and halvings */
-  bool found;      /* false: no w gives a convex surface, control is untouched */
+  bool found;      /* false: not even a bent plane will do, control is untouched */
   bool whole;      /* already w_least does: it is the best fit, and needs no inequalities */
+  bool bent;       /* none is: it is a plane, bent a little, weight is INFINITY */
 } convex_reference;
 
 /* Whether the generator of inequalities takes a surface for strictly convex. Fails: NOMEM, CANCELLED. */

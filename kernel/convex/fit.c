@@ -34,6 +34,8 @@ typedef struct fit {
   convex_program program;
   convex_rows rows;
   bool have_rows;
+  bool bent; /* the first reference: only the end tells whether the data have a convex surface */
+  convex_verdict verdict;
   convex_track convex, unconstrained;
   batten_convex_info info;
 } fit;
@@ -377,6 +379,7 @@ static batten_status fit_plane(fit *f) {
     double s = f->free[i / nv] * size[0] - flat[0], t = f->free[nu + i % nv] * size[1] - flat[1];
     for (size_t k = 0; k < 3; k++) f->trial[3 * i + k] = mean[k] + s * axes[0][k] + t * axes[1][k];
   }
+  f->convex.sum = INFINITY;
   offer(f, &f->convex, f->trial, f->parameters);
   return BATTEN_OK;
 }
@@ -392,6 +395,7 @@ static batten_status find_reference(fit *f, bool *found) {
   f->info.time_reference_s = batten_now() - start;
   if (st < 0) return st;
   *found = r.found;
+  f->bent = r.bent;
   f->info.tension_weight = r.weight / f->weight_unit;
   f->info.tension_steps = r.steps;
   if (!r.found) return BATTEN_OK;
@@ -401,26 +405,28 @@ static batten_status find_reference(fit *f, bool *found) {
   return BATTEN_OK;
 }
 
+/* Whether the points are a plane's, to rounding of the fit. */
+static bool is_flat(const fit *f) { return f->unconstrained.sum <= 1e-18 * f->total && f->bent; }
+
 static batten_status run(fit *f) {
   bool found;
   batten_status st = find_reference(f, &found);
   if (st < 0) return st;
-  f->info.plane = !found;
   f->info.rounds = 1;
   if (found) st = run_rounds(f);
   if (st >= 0) st = run_unconstrained(f);
-  if (st >= 0 && !found) st = fit_plane(f);
-  return st;
+  if (st >= 0 && found)
+    st = convex_judge(f->ctx, &f->space, f->count, f->points, f->weights, &f->convex, &f->verdict);
+  if (st < 0) return st;
+  f->info.misfit = f->verdict.misfit;
+  f->info.plane = !found || (f->bent && (f->verdict.dent || is_flat(f)));
+  return f->info.plane ? fit_plane(f) : BATTEN_OK;
 }
 
 /* What the caller is told. */
 static batten_status judge(fit *f) {
   const double *at = f->info.convexity.worst_at;
-  convex_verdict v;
-  batten_status st =
-      convex_judge(f->ctx, &f->space, f->count, f->points, f->weights, &f->convex, &f->unconstrained, &v);
-  if (st < 0) return st;
-  f->info.misfit = v.misfit;
+  const convex_verdict *v = &f->verdict;
   if (f->info.plane)
     return batten_fail(f->ctx, BATTEN_W_SHAPE,
                        "points: no convex surface near them was found; the result is their best plane, which misses "
@@ -431,13 +437,16 @@ static batten_status judge(fit *f) {
                        "the surface is not proven convex near (%g, %g), where its Gaussian curvature is %g; raise "
                        "opt.margin or opt.tension",
                        at[0], at[1], f->info.convexity.margin_min);
-  if (v.dent)
-    return batten_fail(f->ctx, BATTEN_W_SHAPE,
-                       "points: %zu of them depart from the convex surface by more than noise does (%.1f standard "
-                       "deviations), points[%zu] the most, by %g; leave out the points of the dent, split the data, "
-                       "or accept the flattened surface",
-                       v.neighbours, v.misfit, v.worst, v.depth / f->unit);
-  return BATTEN_OK;
+  if (!v->dent) return BATTEN_OK;
+  const double *place = f->convex.parameters + 2 * v->worst;
+  double there[2];
+  for (int k = 0; k < 2; k++) there[k] = f->domain[k][0] + place[k] * (f->domain[k][1] - f->domain[k][0]);
+  return batten_fail(
+      f->ctx, BATTEN_W_SHAPE,
+      "points: they bend inwards by more than noise does (%.1f standard deviations): %zu lie inside the convex "
+      "surface near (%g, %g), points[%zu] the deepest, by %g; leave out the points of the dent, split "
+      "the data, or accept the flattened surface",
+      v->misfit, v->neighbours, there[0], there[1], v->worst, v->depth / f->unit);
 }
 
 batten_status batten_convex_fit(batten_context *ctx, size_t count, const double *points,

@@ -38,16 +38,15 @@ typedef struct convex_track {
   double sum;         /* weighted */
 } convex_track;
 
-/* judge.c: whether the data depart from the convex surface as noise does. */
+/* judge.c: whether the data bend inwards by more than noise does. */
 typedef struct convex_verdict {
   double misfit; /* as batten_convex_info.misfit */
   bool dent;
-  size_t worst;      /* the point that is deepest in it */
-  double depth;      /* its distance from the convex surface */
-  size_t neighbours; /* points of the dent */
+  size_t worst;      /* the point that is deepest in it, */
+  double depth;      /* its distance inside the convex surface, */
+  size_t neighbours; /* points inside, of that part of the data */
 } convex_verdict;
 batten_status convex_judge(batten_context *ctx, const convex_space *space, size_t count, const double *points,
-                           const double *weights, const convex_track *convex, const convex_track *free,
-                           convex_verdict *out);
+                           const double *weights, const convex_track *convex, convex_verdict *out);
 
 #endif

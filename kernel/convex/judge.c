@@ -1,42 +1,51 @@
-/* Noise, or a dent: do data lie beside the convex surface together, where they lie on the unconstrained one?
+/* Noise, or a dent: do the data themselves bend inwards somewhere?
  *
- * Every point has its distances from both surfaces along the convex one's normal, s_c and s_f. The deviation s of
- * noise is that of s_f, less the freedom that the control points had. Then the domain is parted into squares of all
- * sizes, shifted by halves. Noise of n points in a square has a mean of deviation s / sqrt(n); so
- *   (|mean of s_c| - |mean of s_f|) sqrt(n) / s
- * tells in deviations how surely they lie to one side of the convex surface and not of the other. The largest of all
- * squares is the misfit. What neither surface can follow raises both means and is no dent. A mean below s itself is
- * of no matter to anybody, however many points make it sure: more than 36 = MISFIT^2 points count as 36. */
+ * The domain is parted into squares of several sizes, shifted by halves. Of three squares in a row (along u, v or a
+ * diagonal) with means m_1, m_0, m_2 of their points, m_0 lies outside the chord from m_1 to m_2 where the data are
+ * those of a convex surface: up to noise, whose means over n points have the deviation s / sqrt(n). How far m_0 lies
+ * inside, in deviations of that difference, tells how sure a dent is. The largest over all triples is the misfit. It
+ * asks nothing of the space of surfaces: what that cannot follow is no dent, and a dent that it cannot follow is one.
+ *
+ * The convex surface serves as a datum: the means are those of the points' distances along its outward normal, the
+ * rise of its own points over their chord is added. The noise s is the median deviation about the means of small
+ * squares, which dents and slopes of the residual hardly touch. */
 #include "fit_inner.h"
 
 #include "base/checked.h"
+#include "basis/quantile.h"
 #include "mesh/vec.h"
 
 #include <string.h>
 
-/* 6 deviations: noise does that once in a billion squares. */
+/* 6 deviations: noise does that once in a billion triples. */
 static const double MISFIT = 6;
-/* 1e-4 of the points' size: what departs by less is flat, or a little hollow, to the eye and the hand; surfaces that
- * are only just convex, like cylinders, are fitted by strictly convex ones as well as that. */
+/* 1e-4 of the points' size: what departs by less is even to the eye and the hand. */
 static const double FLOOR = 1e-4;
-enum { LEVELS = 6, FEWEST = 3, COUNTED = 36 };
+/* 36 = MISFIT^2: more points of a square count as 36, so that a dent below the noise itself, which matters to nobody,
+ * is not one however many points make it sure. */
+enum { LEVELS = 5, FEWEST = 3, COUNTED = 36, TYPICAL = 6, DIRECTIONS = 4 };
 
 typedef struct square {
   size_t points;
-  double weight, convex, free; /* sums */
+  double weight, sum, squares, place[2]; /* of weights, of distances, of places */
 } square;
 
 typedef struct scan {
+  const convex_space *space;
+  const double *control;
   size_t count;
   const double *weights, *places;
-  const double *sides; /* [count][2] s_c, s_f */
+  const double *heights; /* [count] outwards */
   double noise;
-  square *squares; /* [(2^LEVELS + 1)^2] */
-  double misfit;   /* of the worst square, */
-  unsigned level;  /* and where that is */
+  square *squares;         /* [(2^LEVELS + 1)^2] */
+  weighted_sample *spread; /* likewise: of noise in squares */
+  double misfit;           /* of the worst triple, */
+  unsigned level;          /* and where its middle is */
   int shift[2];
   size_t at;
 } scan;
+
+static double weight_of(const scan *s, size_t i) { return s->weights ? s->weights[i] : 1; }
 
 /* The square of a place: 2^level in either direction, or one more where shifted by half a square. */
 static size_t square_of(const double *place, unsigned level, const int *shift) {
@@ -49,9 +58,7 @@ static size_t square_of(const double *place, unsigned level, const int *shift) {
   return at;
 }
 
-static double weight_of(const scan *s, size_t i) { return s->weights ? s->weights[i] : 1; }
-
-static void scan_level(scan *s, unsigned level, const int *shift) {
+static void fill_squares(scan *s, unsigned level, const int *shift) {
   size_t side = ((size_t)1 << level) + 1;
   memset(s->squares, 0, side * side * sizeof *s->squares);
   for (size_t i = 0; i < s->count; i++) {
@@ -60,88 +67,133 @@ static void scan_level(scan *s, unsigned level, const int *shift) {
     square *q = &s->squares[square_of(s->places + 2 * i, level, shift)];
     q->points++;
     q->weight += weight;
-    q->convex += weight * s->sides[2 * i];
-    q->free += weight * s->sides[2 * i + 1];
+    q->sum += weight * s->heights[i];
+    q->squares += weight * s->heights[i] * s->heights[i];
+    for (size_t k = 0; k < 2; k++) q->place[k] += weight * s->places[2 * i + k];
   }
+}
+
+/* The median over squares of some TYPICAL points of what their points deviate from their mean. */
+static double find_noise(scan *s) {
+  unsigned level = 0;
+  size_t used = 0;
+  while (level < LEVELS && (double)s->count > TYPICAL * ldexp(1, 2 * (int)level + 2)) level++;
+  size_t side = ((size_t)1 << level) + 1;
+  fill_squares(s, level, (const int[2]){0, 0});
   for (size_t k = 0; k < side * side; k++) {
     const square *q = &s->squares[k];
     if (q->points < FEWEST) continue;
-    double excess = (fabs(q->convex) - fabs(q->free)) / q->weight;
-    double misfit = excess * sqrt((double)(q->points < COUNTED ? q->points : COUNTED)) / s->noise;
-    if (!(misfit > s->misfit)) continue;
-    s->misfit = misfit;
-    s->level = level;
-    memcpy(s->shift, shift, sizeof s->shift);
-    s->at = k;
+    double n = (double)q->points, mean = q->sum / q->weight, freedom = n - 1;
+    double variance = fmax(q->squares / q->weight - mean * mean, 0) * n / freedom;
+    /* the median of chi-squared is below its mean */
+    s->spread[used++] = (weighted_sample){variance / pow(1 - 2 / (9 * freedom), 3), 1};
   }
+  return used ? sqrt(weighted_quantile(used, s->spread, 0.5)) : INFINITY;
 }
 
-/* Distances along the convex surface's normal from both. */
-static void measure_sides(const convex_space *space, size_t count, const double *points, const convex_track *convex,
-                          const convex_track *free, double *sides) {
-  for (size_t i = 0; i < count; i++) {
-    double jet[6][3], other[6][3], normal[3], d[3];
-    convex_jet(space, convex->control, convex->parameters + 2 * i, jet);
-    convex_jet(space, free->control, free->parameters + 2 * i, other);
+/* How far the surface rises over the chord between two places, at part b of it, outwards. */
+static double rise_over_chord(const scan *s, const double *from, const double *to, double b) {
+  double ends[2][6][3], middle[6][3], normal[3], d[3];
+  double place[2] = {(1 - b) * from[0] + b * to[0], (1 - b) * from[1] + b * to[1]};
+  convex_jet(s->space, s->control, from, ends[0]);
+  convex_jet(s->space, s->control, to, ends[1]);
+  convex_jet(s->space, s->control, place, middle);
+  vec_cross(middle[1], middle[2], normal);
+  vec_normalize(normal);
+  for (int k = 0; k < 3; k++) d[k] = middle[0][k] - (1 - b) * ends[0][0][k] - b * ends[1][0][k];
+  return vec_dot(middle[3], normal) > 0 ? -vec_dot(d, normal) : vec_dot(d, normal);
+}
+
+static double variance_of(const square *q) { return 1.0 / (double)(q->points < COUNTED ? q->points : COUNTED); }
+
+/* In deviations, how far the middle one of three lies inside the chord of the others; negative outside. */
+static double inside_chord(const scan *s, const square *one, const square *middle, const square *two) {
+  double from[2], to[2], at[2], along = 0, length = 0;
+  for (int k = 0; k < 2; k++) {
+    from[k] = one->place[k] / one->weight;
+    to[k] = two->place[k] / two->weight;
+    at[k] = middle->place[k] / middle->weight;
+    along += (at[k] - from[k]) * (to[k] - from[k]);
+    length += (to[k] - from[k]) * (to[k] - from[k]);
+  }
+  double b = along / length;
+  if (!(b > 0.2 && b < 0.8)) return -INFINITY; /* the means are no row */
+  double rise = middle->sum / middle->weight - (1 - b) * one->sum / one->weight - b * two->sum / two->weight;
+  double variance = variance_of(middle) + (1 - b) * (1 - b) * variance_of(one) + b * b * variance_of(two);
+  rise /= s->noise * sqrt(variance);
+  if (-rise <= s->misfit) return -INFINITY; /* the surface's own rise only makes it less */
+  return -rise - rise_over_chord(s, from, to, b) / (s->noise * sqrt(variance));
+}
+
+static void scan_level(scan *s, unsigned level, const int *shift) {
+  static const int steps[DIRECTIONS][2] = {{1, 0}, {0, 1}, {1, 1}, {1, -1}};
+  size_t side = ((size_t)1 << level) + 1;
+  fill_squares(s, level, shift);
+  for (size_t i = 0; i < side; i++)
+    for (size_t j = 0; j < side; j++)
+      for (int d = 0; d < DIRECTIONS; d++) {
+        bool inner = (!steps[d][0] || (i > 0 && i + 1 < side)) && (!steps[d][1] || (j > 0 && j + 1 < side));
+        if (!inner) continue;
+        const square *q = &s->squares[i * side + j];
+        ptrdiff_t step = steps[d][0] * (ptrdiff_t)side + steps[d][1];
+        if (q->points < FEWEST || q[-step].points < FEWEST || q[step].points < FEWEST) continue;
+        double misfit = inside_chord(s, q - step, q, q + step);
+        if (!(misfit > s->misfit)) continue;
+        s->misfit = misfit;
+        s->level = level;
+        memcpy(s->shift, shift, sizeof s->shift);
+        s->at = i * side + j;
+      }
+}
+
+/* Distances along the outward normal. */
+static void measure_heights(const scan *s, const double *points, double *heights) {
+  for (size_t i = 0; i < s->count; i++) {
+    double jet[6][3], normal[3], d[3];
+    convex_jet(s->space, s->control, s->places + 2 * i, jet);
     vec_cross(jet[1], jet[2], normal);
     vec_normalize(normal);
     vec_sub(points + 3 * i, jet[0], d);
-    sides[2 * i] = vec_dot(d, normal);
-    vec_sub(points + 3 * i, other[0], d);
-    sides[2 * i + 1] = vec_dot(d, normal);
+    heights[i] = vec_dot(jet[3], normal) > 0 ? -vec_dot(d, normal) : vec_dot(d, normal);
   }
 }
 
-/* Deviation of the noise; negative when there are too few points to tell. */
-static double noise_of(const scan *s, double unknowns) {
-  double squares = 0, weights = 0, points = 0;
-  for (size_t i = 0; i < s->count; i++) {
-    squares += weight_of(s, i) * s->sides[2 * i + 1] * s->sides[2 * i + 1];
-    weights += weight_of(s, i);
-    points += weight_of(s, i) > 0 ? 1 : 0;
-  }
-  return points > unknowns + 1 ? sqrt(squares / weights * points / (points - unknowns)) : -1;
-}
-
+/* The points of the middle square that lie inside, and the deepest. */
 static void describe(const scan *s, convex_verdict *v) {
-  double deepest = -1, side = s->squares[s->at].convex;
+  double deepest = -INFINITY;
   for (size_t i = 0; i < s->count; i++) {
     if (!(weight_of(s, i) > 0) || square_of(s->places + 2 * i, s->level, s->shift) != s->at) continue;
-    double depth = side < 0 ? -s->sides[2 * i] : s->sides[2 * i];
-    if (depth > 2 * s->noise) v->neighbours++;
-    if (!(depth > deepest)) continue;
-    deepest = depth;
+    if (s->heights[i] < 0) v->neighbours++;
+    if (!(-s->heights[i] > deepest)) continue;
+    deepest = -s->heights[i];
     v->worst = i;
   }
-  v->depth = deepest;
+  v->depth = fabs(deepest);
 }
 
 batten_status convex_judge(batten_context *ctx, const convex_space *space, size_t count, const double *points,
-                           const double *weights, const convex_track *convex, const convex_track *free,
-                           convex_verdict *out) {
+                           const double *weights, const convex_track *convex, convex_verdict *out) {
   size_t side = ((size_t)1 << LEVELS) + 1;
   convex_verdict v = {0};
-  batten_status st = BATTEN_E_NOMEM;
-  double *sides = batten_alloc_array(ctx, 2 * count, sizeof *sides);
-  scan s = {.count = count, .weights = weights, .places = convex->parameters, .sides = sides};
+  double *heights = batten_alloc_array(ctx, count, sizeof *heights);
+  scan s = {.space = space, .control = convex->control, .count = count, .weights = weights};
+  s.places = convex->parameters;
+  s.heights = heights;
   s.squares = batten_alloc_array(ctx, side * side, sizeof *s.squares);
-  if (!sides || !s.squares) goto done;
-  st = BATTEN_OK;
-  measure_sides(space, count, points, convex, free, sides);
-  s.noise = noise_of(&s, (double)convex_points(space));
-  bool known = s.noise >= 0;
-  s.noise = fmax(s.noise, FLOOR);
-  for (unsigned level = 0; level <= LEVELS && known; level++)
-    for (int shift = 0; shift < 4; shift++) scan_level(&s, level, (const int[2]){shift % 2, shift / 2});
-  v.misfit = s.misfit;
-  v.dent = s.misfit > MISFIT;
-  if (v.dent) {
-    scan_level(&s, s.level, (const int[2]){s.shift[0], s.shift[1]}); /* its sums again */
-    describe(&s, &v);
+  s.spread = batten_alloc_array(ctx, side * side, sizeof *s.spread);
+  batten_status st = heights && s.squares && s.spread ? BATTEN_OK : BATTEN_E_NOMEM;
+  if (st >= 0) {
+    measure_heights(&s, points, heights);
+    s.noise = fmax(find_noise(&s), FLOOR);
+    for (unsigned level = 1; level <= LEVELS; level++)
+      for (int shift = 0; shift < 4; shift++) scan_level(&s, level, (const int[2]){shift % 2, shift / 2});
+    v.misfit = s.misfit;
+    v.dent = s.misfit > MISFIT;
+    if (v.dent) describe(&s, &v);
+    *out = v;
   }
-  *out = v;
-done:
+  batten_free(ctx, s.spread);
   batten_free(ctx, s.squares);
-  batten_free(ctx, sides);
+  batten_free(ctx, heights);
   return st;
 }

@@ -274,8 +274,8 @@ static void centre(const convex_objective *o, const double *parameters, size_t a
   for (size_t i = 0; i < o->count; i++) *reach = fmax(*reach, fabs(parameters[2 * i + axis] - *mean));
 }
 
-/* Control points of t and of t^2, t = (parameter - mean) / reach: values of their blossoms at the knots. */
-static void quadratic(const bspline *b, size_t i, double mean, double reach, double out[2]) {
+/* Values of the blossoms at the knots. */
+void convex_quadratic(const bspline *b, size_t i, double mean, double reach, double out[2]) {
   double sum = 0, pairs = 0;
   for (unsigned j = 1; j <= b->degree; j++) {
     double t = (b->knots[i + j] - mean) / reach;
@@ -318,8 +318,8 @@ batten_status convex_objective_limit(batten_context *ctx, const convex_objective
   for (size_t i = 0; i < space->axis[0].count; i++)
     for (size_t j = 0; j < space->axis[1].count; j++) {
       double u[2], v[2];
-      quadratic(&space->axis[0], i, mean[0], reach[0], u);
-      quadratic(&space->axis[1], j, mean[1], reach[1], v);
+      convex_quadratic(&space->axis[0], i, mean[0], reach[0], u);
+      convex_quadratic(&space->axis[1], j, mean[1], reach[1], v);
       for (int k = 0; k < 3; k++) {
         const double *c = right + k * LIMIT;
         control[3 * (i * space->axis[1].count + j) + (size_t)k] =

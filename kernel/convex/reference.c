@@ -2,7 +2,11 @@
  *
  * F = sum of squares + w T. From w = 1 the weight is halved as long as the surface stays convex, or doubled until it
  * is. What is convex is said by the generator of inequalities, which must be able to enclose the surface; samples of
- * the Gaussian curvature spare it the hopeless ones. */
+ * the Gaussian curvature spare it the hopeless ones.
+ *
+ * Noise that is larger than the rise of the data over their plane may leave none convex, up to the limit. A plane
+ * that is bent a little then serves: its inequalities hold for every surface near the plane that bends to its side.
+ * Whether the data agree with one, or are a saddle, is asked when the fit is done. */
 #include "convex_inner.h"
 
 #include "basis/shape.h"
@@ -80,6 +84,34 @@ static batten_status walk(batten_context *ctx, const search *s, double w_least, 
   return st;
 }
 
+/* A plane through the middles of the sides of `limit`, bent to the side to which `limit` bends the more. False: there
+ * is no plane. */
+static bool bend(const convex_space *space, const double *limit, double *control) {
+  static const double sides[4][2] = {{0, 0.5}, {1, 0.5}, {0.5, 0}, {0.5, 1}};
+  /* 0.1: flat enough for few boxes, and far from flat to rounding */
+  const double rise = 0.1;
+  double jet[4][6][3], u[3], v[3], n[3], middle[3], bends = 0;
+  for (int k = 0; k < 4; k++) convex_jet(space, limit, sides[k], jet[k]);
+  vec_sub(jet[1][0], jet[0][0], u);
+  vec_sub(jet[3][0], jet[2][0], v);
+  vec_cross(u, v, n);
+  double size = fmin(vec_norm(u), vec_norm(v)), area = vec_norm(n);
+  if (!(area > 1e-3 * vec_norm(u) * vec_norm(v))) return false;
+  for (int k = 0; k < 3; k++) middle[k] = (jet[0][0][k] + jet[1][0][k] + jet[2][0][k] + jet[3][0][k]) / 4;
+  bends = vec_dot(jet[0][3], n) / vec_dot(u, u) + vec_dot(jet[0][5], n) / vec_dot(v, v);
+  double height = (bends < 0 ? -rise : rise) * size / area;
+  size_t nv = space->axis[1].count;
+  for (size_t i = 0; i < space->axis[0].count; i++)
+    for (size_t j = 0; j < nv; j++) {
+      double s[2], t[2];
+      convex_quadratic(&space->axis[0], i, 0.5, 1, s);
+      convex_quadratic(&space->axis[1], j, 0.5, 1, t);
+      for (size_t k = 0; k < 3; k++)
+        control[3 * (i * nv + j) + k] = middle[k] + s[0] * u[k] + t[0] * v[k] + height * (s[1] + t[1]) * n[k];
+    }
+  return true;
+}
+
 batten_status convex_reference_find(batten_context *ctx, const convex_objective *o, const convex_space *space,
                                     const double *parameters, const convex_row_options *rows, double w_least,
                                     convex_reference *out) {
@@ -105,6 +137,12 @@ batten_status convex_reference_find(batten_context *ctx, const convex_objective 
   if (!best.found) {
     st = convex_is_convex(ctx, space, limit, rows, &convex);
     if (st < 0) goto done;
+    if (!convex && bend(space, limit, control)) {
+      memcpy(limit, control, bytes);
+      st = convex_is_convex(ctx, space, limit, rows, &convex);
+      if (st < 0) goto done;
+      best.bent = convex;
+    }
     if (convex) {
       memcpy(out->control, limit, bytes);
       best.weight = INFINITY;
