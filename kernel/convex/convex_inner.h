@@ -11,7 +11,10 @@
  * inequalities.c           those inequalities as rows
  * reference.c              the search for the tension weight [section 3]
  * correct.c                parameter correction
- * fit.c                    batten_convex_fit: checks, scales, rounds, judgement
+ * program.c                the quadratic program of a round [section 5]
+ * judge.c                  noise or a dent
+ * options.c                of fits: defaults, ranges, data that make no sense
+ * fit.c                    batten_convex_fit: scales, rounds, certificate
  * function_rows.c, function.c   batten_convex_function_fit
  *
  * In all of it points are scaled to a box of size about 1 around 0 (by a power of two), the domain is [0, 1]^2, and

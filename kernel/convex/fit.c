@@ -10,6 +10,7 @@
 #include "fit_inner.h"
 
 #include "base/checked.h"
+#include "basis/eigen3.h"
 #include "mesh/vec.h"
 #include "plane.h"
 
@@ -118,14 +119,13 @@ static batten_status find_parameters(fit *f, const double *points) {
   return BATTEN_OK;
 }
 
-/* The domain that the caller sees where parameters are estimated. */
+/* The domain that the caller sees where parameters are estimated: [0, 1]^2 where it is to be their box. */
 static batten_status check_domain(fit *f) {
-  if (f->opt->parameters) return BATTEN_OK;
-  double corners[4] = {f->opt->domain[0][0], f->opt->domain[1][0], f->opt->domain[0][1], f->opt->domain[1][1]};
   size_t absent = 0;
-  for (int k = 0; k < 4; k++) absent += isnan(corners[k]) ? 1 : 0;
-  if (absent == 4) return BATTEN_OK;
-  return convex_domain(f->ctx, 2, corners, f->opt, f->domain);
+  for (int k = 0; k < 4; k++) absent += isnan(f->opt->domain[k / 2][k % 2]) ? 1 : 0;
+  if (f->opt->parameters || absent == 4) return BATTEN_OK;
+  memcpy(f->domain, f->opt->domain, sizeof f->domain);
+  return convex_domain_check(f->ctx, f->opt->domain);
 }
 
 static batten_status make_space(fit *f) {
@@ -405,21 +405,36 @@ static batten_status find_reference(fit *f, bool *found) {
   return BATTEN_OK;
 }
 
-/* Whether the points are a plane's, to rounding of the fit. */
-static bool is_flat(const fit *f) { return f->unconstrained.sum <= 1e-18 * f->total && f->bent; }
+/* Whether the points are a plane's, to rounding of their coordinates. */
+static bool is_flat(const fit *f) {
+  double mean[3] = {0, 0, 0}, moments[9] = {0}, values[3], axes[9], far = 1, off = 0;
+  for (size_t i = 0; i < 3 * f->count; i++) mean[i % 3] += f->points[i] / (double)f->count;
+  for (size_t i = 0; i < f->count; i++)
+    for (size_t k = 0; k < 9; k++)
+      moments[k] += (f->points[3 * i + k / 3] - mean[k / 3]) * (f->points[3 * i + k % 3] - mean[k % 3]);
+  batten_eigen_symmetric(3, moments, values, axes);
+  for (int k = 0; k < 3; k++) far = fmax(far, fabs(f->middle[k]) * f->unit);
+  for (size_t i = 0; i < f->count; i++) {
+    double d[3];
+    vec_sub(f->points + 3 * i, mean, d);
+    off = fmax(off, fabs(vec_dot(d, axes)));
+  }
+  return off <= 64 * DBL_EPSILON * far;
+}
 
 static batten_status run(fit *f) {
   bool found;
   batten_status st = find_reference(f, &found);
   if (st < 0) return st;
   f->info.rounds = 1;
+  found = found && !is_flat(f);
   if (found) st = run_rounds(f);
   if (st >= 0) st = run_unconstrained(f);
   if (st >= 0 && found)
     st = convex_judge(f->ctx, &f->space, f->count, f->points, f->weights, &f->convex, &f->verdict);
   if (st < 0) return st;
   f->info.misfit = f->verdict.misfit;
-  f->info.plane = !found || (f->bent && (f->verdict.dent || is_flat(f)));
+  f->info.plane = !found || (f->bent && f->verdict.dent);
   return f->info.plane ? fit_plane(f) : BATTEN_OK;
 }
 

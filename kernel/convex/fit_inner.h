@@ -9,6 +9,8 @@ batten_status convex_options_check(batten_context *ctx, const batten_convex_opti
 /* options.c: data that no fit makes sense of: INVALID. parameters as the caller gave them, or NULL. */
 batten_status convex_data_check(batten_context *ctx, size_t count, const double *points,
                                 const batten_convex_options *opt);
+/* options.c: bounds in their order, or INVALID. */
+batten_status convex_domain_check(batten_context *ctx, const double domain[2][2]);
 /* options.c: the domain that the options mean. */
 batten_status convex_domain(batten_context *ctx, size_t count, const double *parameters,
                             const batten_convex_options *opt, double domain[2][2]);

@@ -160,6 +160,15 @@ static void parameter_box(size_t count, const double *parameters, double box[2][
   }
 }
 
+batten_status convex_domain_check(batten_context *ctx, const double domain[2][2]) {
+  for (int k = 0; k < 2; k++)
+    if (!(domain[k][0] < domain[k][1]) || !isfinite(domain[k][1] - domain[k][0]))
+      return batten_fail(ctx, BATTEN_E_INVALID,
+                         "opt.domain[%d]: %g to %g; give finite bounds, the lower first, or NaN for all four", k,
+                         domain[k][0], domain[k][1]);
+  return BATTEN_OK;
+}
+
 batten_status convex_domain(batten_context *ctx, size_t count, const double *parameters,
                             const batten_convex_options *opt, double domain[2][2]) {
   double box[2][2];
@@ -172,11 +181,9 @@ batten_status convex_domain(batten_context *ctx, size_t count, const double *par
                          "parameters: all %zu have %s = %g; spread them, or leave opt.parameters NULL", count,
                          k ? "v" : "u", box[k][0]);
     for (int i = 0; i < 2; i++) domain[k][i] = absent == 4 ? box[k][i] : opt->domain[k][i];
-    if (!(domain[k][0] < domain[k][1]) || !isfinite(domain[k][1] - domain[k][0]))
-      return batten_fail(ctx, BATTEN_E_INVALID,
-                         "opt.domain[%zu]: %g to %g; give finite bounds, the lower first, or NaN for all four", k,
-                         domain[k][0], domain[k][1]);
   }
+  batten_status st = convex_domain_check(ctx, (const double(*)[2])domain);
+  if (st < 0) return st;
   for (size_t i = 0; i < 2 * count; i++)
     if (parameters[i] < domain[i % 2][0] || parameters[i] > domain[i % 2][1])
       return batten_fail(

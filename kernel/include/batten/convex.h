@@ -72,7 +72,8 @@ typedef struct batten_convex_options {
   const double *weights; /* [count] >= 0, NULL = ones */
 
   unsigned rounds;   /* of inequalities, quadratic program and parameter correction, 1 .. 100. Default 10. */
-  double rounds_tol; /* stop when a round lowers the sum of squares by a smaller part. Default 1e-3. */
+  double rounds_tol; /* >= 0. A round that lowers the sum of squares by a smaller part divides the blend by 3; when
+                        that has happened three times, the next such round is the last. Default 1e-3. */
   unsigned
       correction_passes; /* of parameter correction (nearest places) in each round, 0 = parameters stay. Default 3. */
   double tension;        /* weight of the integral of |x_uuu|^2 + |x_vvv|^2 + |x_uv|^2 beside the mean square
@@ -102,7 +103,8 @@ typedef struct batten_convex_info {
   double lsq;                     /* of the result */
   double rms, max_error;          /* of the result: distances of points from their places */
   size_t max_error_index;         /* that point */
-  double tension_weight;  /* of the first reference: the paper's w, beside the sum, for points scaled to size 1 */
+  double tension_weight;  /* of the first reference: the paper's w, beside the sum. INFINITY: its limit, or, where that
+                             bends both ways too, a plane that is bent a little. */
   unsigned tension_steps; /* doublings and halvings */
   unsigned rounds;        /* that were run */
   unsigned round_best;    /* that gave the result, 0 = the reference already */
@@ -111,8 +113,9 @@ typedef struct batten_convex_info {
   double lsq_per_round[BATTEN_CONVEX_ROUNDS_MAX]; /* after parameter correction; never rises */
   size_t rows_active;                             /* of the last quadratic program */
   int plane;                   /* non-zero: no convex reference was found, the result is the best plane */
-  double misfit;               /* how much larger the mean square is than that of the unconstrained fit, in standard
-                                  deviations of what noise would do; see BATTEN_W_SHAPE */
+  double misfit; /* how far the data bend inwards: of three neighbouring parts of them in a row the middle one's mean
+                    lies inside the chord of the others by so many standard deviations of noise; the largest there
+                    is. 0 of fewer points than show it. See BATTEN_W_SHAPE */
   double gauss_min, gauss_max; /* of the result */
   double gauss_min_unconstrained, gauss_max_unconstrained;
   batten_convexity convexity; /* of the result */
@@ -122,14 +125,16 @@ typedef struct batten_convex_info {
 /* Fits a convex surface to points [count][3], any unit, count >= 6.
  *   unconstrained  NULL, or a new surface: the fit without inequalities, for comparison
  *   info           NULL, or the figures
- * Progress phases: "parameters", "reference", "fit", "certify".
- * BATTEN_OK            fitted, and proven strictly convex (info->convexity.certified)
- * BATTEN_W_SHAPE       done, but the data have another shape: no convex surface near them was found, and the result
- * is the best plane (info->plane); or the result is proven convex, but the data depart from it by far more than from
- * the unconstrained fit: a dent. The text says where and by how much. BATTEN_W_ACCURACY    not proven; the text says
- * where Same bits for any number of threads. Fails: INVALID (points on a line, all parameters equal, parameters
- * outside the domain, named), NOMEM, TOO_LARGE, SINGULAR (parameters on a conic of parallel axes do not determine a
- * surface), CANCELLED. */
+ * Progress phases: "parameters", "reference", "quadratic program", "fit", "certify", "measure".
+ * BATTEN_OK          fitted, and proven strictly convex (info->convexity.certified)
+ * BATTEN_W_SHAPE     done, but the data have another shape: no convex surface near them was found, and the result is
+ *                    the best plane (info->plane); or the result is proven convex, but the data bend inwards by 6
+ *                    standard deviations of their noise (info->misfit): a dent. The text says where and by how much.
+ * BATTEN_W_ACCURACY  not proven; the text says where
+ * Without `parameters` a domain that is all NaN is [0, 1]^2. Same bits for any number of threads, and for points
+ * scaled by a power of two. Bytes: some 40 n^2, n control points, and the inequalities. Fails: INVALID (points on a
+ * line, all parameters equal, parameters outside the domain, named), NOMEM, TOO_LARGE, SINGULAR (the parameters lie on
+ * a conic of parallel axes, or without tension do not determine the control points), CANCELLED. */
 BATTEN_API batten_status batten_convex_fit(batten_context *ctx, size_t count, const double *points,
                                            const batten_convex_options *opt, batten_surface **out,
                                            batten_surface **unconstrained, batten_convex_info *info);
