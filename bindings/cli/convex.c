@@ -39,7 +39,7 @@ enum {
 static const cli_option table[] = {
     {"output", 'o', "FILE",
      "surface, by extension: .step .stp .iges .igs (CAD), .json (reads back to the same\n"
-     "bits), .vtu (Bezier patches); or a mesh of it: .ply .obj .stl .off .vtp .vtk; may be\ngiven more than once"},
+     "bits), .vtu (Bezier patches); or a mesh of it: .ply .obj .stl .off .vtp .vtk; may\nbe given more than once"},
     {"unconstrained", OPT_UNCONSTRAINED, "FILE", "the fit without inequalities, to compare with; formats as -o"},
     {"picture", OPT_PICTURE, "FILE", "both fits with control nets, level curves and Gaussian curvature, .png"},
     CLI_OPTION_REPORT,

@@ -47,7 +47,7 @@ enum {
 static const cli_option table[] = {
     {"output", 'o', "FILE",
      "surface, by extension: .step .stp .iges .igs (CAD), .json (reads back to the same\n"
-     "bits), .vtu (Bezier triangles); or a mesh of it: .ply .obj .stl .off .vtp; may be\ngiven more than once"},
+     "bits), .vtu (Bezier triangles); or a mesh of it: .ply .obj .stl .off .vtp .vtk; may\nbe given more than once"},
     {"picture", OPT_PICTURE, "FILE", "shaded view .png, coloured by curvature"},
     CLI_OPTION_REPORT,
     {"continuity", OPT_CONTINUITY, "G1|G2",

@@ -11,10 +11,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-static const char *const surface_formats[] = {".ply", ".obj", ".stl", ".off", ".vtp", ".vtu", NULL};
+static const char *const surface_formats[] = {".ply", ".obj", ".stl", ".off", ".vtp", ".vtu", ".vtk", NULL};
 static const char *const outline_formats[] = {".svg", ".csv", ".xyz", ".txt", ".vtp", ".obj", NULL};
-static const char *const network_formats[] = {".step", ".stp", ".iges", ".igs", ".json", ".vtu",
-                                              ".ply",  ".obj", ".stl",  ".off", ".vtp",  NULL};
+static const char *const network_formats[] = {".step", ".stp", ".iges", ".igs", ".json", ".vtu", ".ply",
+                                              ".obj",  ".stl", ".off",  ".vtp", ".vtk",  NULL};
 static const char *const picture_formats[] = {".png", NULL};
 static const char *const plane_picture_formats[] = {".svg", ".png", NULL};
 static const char *const qp_formats[] = {".qps", ".sif", ".mps", ".json", NULL};
@@ -143,10 +143,11 @@ static const rule *rule_of(cli_output_kind kind) {
   static const rule rules[] = {
       {CLI_OUTPUT_PICTURE, plane_picture_formats, "--picture", ".png, for plane solids also .svg"},
       {CLI_OUTPUT_SHADED, picture_formats, "--picture", ".png"},
-      {CLI_OUTPUT_NETWORK, network_formats, "-o", ".step .iges .json .vtu, or of a mesh .ply .obj .stl .off .vtp"},
-      {CLI_OUTPUT_PATCH, network_formats, "-o", ".step .iges .json .vtu, or of a mesh .ply .obj .stl .off .vtp"},
+      {CLI_OUTPUT_NETWORK, network_formats, "-o",
+       ".step .iges .json .vtu, or of a mesh .ply .obj .stl .off .vtp .vtk"},
+      {CLI_OUTPUT_PATCH, network_formats, "-o", ".step .iges .json .vtu, or of a mesh .ply .obj .stl .off .vtp .vtk"},
       {CLI_OUTPUT_UNCONSTRAINED, network_formats, "--unconstrained",
-       ".step .iges .json .vtu, or of a mesh .ply .obj .stl .off .vtp"},
+       ".step .iges .json .vtu, or of a mesh .ply .obj .stl .off .vtp .vtk"},
       {CLI_OUTPUT_QP, qp_formats, "--write", ".qps or .json"},
       {CLI_OUTPUT_QP_SOLUTION, qp_solution_formats, "-o", ".json or .csv"},
   };

@@ -35,7 +35,7 @@ enum {
 
 static const cli_option table[] = {
     {"output", 'o', "FILE",
-     "surface, by extension: .ply .obj .stl .off .vtp .vtu; outline of plane points:\n"
+     "surface, by extension: .ply .obj .stl .off .vtp .vtu .vtk; outline of plane points:\n"
      ".svg .csv .xyz .txt .vtp .obj; may be given more than once"},
     {"picture", OPT_PICTURE, "FILE", "shaded view .png, of plane points .png or .svg"},
     CLI_OPTION_REPORT,

@@ -12,8 +12,8 @@
 
 typedef struct bx_component {
   bool closed;
-  bool inward;     /* closed, and its triangles are clockwise seen from outside of it */
-  uint32_t parent; /* closed components inside of others: the solid whose void this one is. Else BX_NONE */
+  bool inward;               /* closed, and its triangles are clockwise seen from outside of it */
+  uint32_t parent;           /* closed components inside of others: the solid whose void this one is. Else BX_NONE */
   uint32_t first, faces;     /* its triangles: sorted [first .. first + faces) */
   uint32_t joints;           /* edges between two of them */
   uint32_t vertex;           /* one of its vertices */
@@ -33,8 +33,8 @@ typedef struct bx_brep {
   double reach; /* largest coordinate of a vertex */
 } bx_brep;
 
-/* Joints are checked to 1e-9 of the size: INVALID names the triangles. Edges of more than two triangles, or passed the
- * same way by both of theirs, are not joined: their triangles bound nothing. */
+/* Joints are checked to 1e-9 of the size: INVALID names the triangles. Edges of more than two triangles, or passed
+ * the same way by both of theirs, are not joined: their triangles bound nothing. */
 batten_status bx_brep_make(batten_context *ctx, const batten_network *network, bx_brep *out);
 void bx_brep_free(batten_context *ctx, bx_brep *b);
 

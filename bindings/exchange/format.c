@@ -24,11 +24,11 @@ bx_format bx_format_of(const char *path, bool *gz) {
   static const struct {
     const char *extension;
     bx_format format;
-  } known[] = {{"xyz", BX_TEXT}, {"txt", BX_TEXT}, {"csv", BX_TEXT}, {"tsv", BX_TEXT}, {"asc", BX_TEXT},
-               {"dat", BX_TEXT}, {"ply", BX_PLY},  {"obj", BX_OBJ},  {"off", BX_OFF},  {"stl", BX_STL},
-               {"vtp", BX_VTP},  {"vtu", BX_VTU},  {"svg", BX_SVG},  {"json", BX_JSON},
-               {"qps", BX_QPS},  {"sif", BX_QPS},  {"mps", BX_QPS},  {"mat", BX_MAT},
-               {"step", BX_STEP}, {"stp", BX_STEP}, {"iges", BX_IGES}, {"igs", BX_IGES}};
+  } known[] = {{"xyz", BX_TEXT}, {"txt", BX_TEXT},  {"csv", BX_TEXT}, {"tsv", BX_TEXT}, {"asc", BX_TEXT},
+               {"dat", BX_TEXT}, {"ply", BX_PLY},   {"obj", BX_OBJ},  {"off", BX_OFF},  {"stl", BX_STL},
+               {"vtp", BX_VTP},  {"vtu", BX_VTU},   {"vtk", BX_VTK},  {"svg", BX_SVG},  {"json", BX_JSON},
+               {"qps", BX_QPS},  {"sif", BX_QPS},   {"mps", BX_QPS},  {"mat", BX_MAT},  {"step", BX_STEP},
+               {"stp", BX_STEP}, {"iges", BX_IGES}, {"igs", BX_IGES}};
   size_t length = strlen(path), at = extension(path, length);
   if (gz) {
     *gz = equals(path + at, length - at, "gz");

@@ -15,6 +15,7 @@ typedef enum bx_format {
   BX_STL,
   BX_VTP,
   BX_VTU,
+  BX_VTK,
   BX_SVG,
   BX_JSON,
   BX_QPS, /* .qps .sif .mps */

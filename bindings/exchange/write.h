@@ -8,11 +8,14 @@
 
 /* The shortest text that reads back to the same bits, with a decimal point in every locale. */
 void bx_put_number(bx_writer *w, double value);
+/* A name as one word of a header: blanks and bytes that are no ASCII become '_'. */
+void bx_put_word(bx_writer *w, const char *name);
 /* count numbers with blanks between. */
 void bx_put_numbers(bx_writer *w, const double *values, size_t count);
 
 void bx_write_vtp(bx_writer *w, const batten_mesh *mesh);
 void bx_write_vtu(bx_writer *w, const batten_mesh *mesh);
+void bx_write_vtk(bx_writer *w, const batten_mesh *mesh);
 
 /* A text of JSON in its quotes; it is UTF-8. */
 void bx_put_json_text(bx_writer *w, const char *text);

@@ -1,4 +1,4 @@
-/* Meshes as PLY, OBJ, OFF and STL; VTK's XML is in vtk.c.
+/* Meshes as PLY, OBJ, OFF and STL; VTK's are in vtk.c and vtk_legacy.c.
  *
  * PLY is binary little endian with doubles and all fields of the mesh; a field of several components becomes NAME_0,
  * NAME_1, ... OBJ, OFF and STL hold the shape alone, STL in single precision with the facets' normals. */
@@ -23,8 +23,7 @@ void bx_put_numbers(bx_writer *w, const double *values, size_t count) {
   }
 }
 
-/* A name as one word of a PLY header: blanks and bytes that are no ASCII become '_'. */
-static void put_word(bx_writer *w, const char *name) {
+void bx_put_word(bx_writer *w, const char *name) {
   for (; *name; name++) bx_put_u8(w, *name > ' ' && *name < 0x7f ? (uint8_t)*name : (uint8_t)'_');
 }
 
@@ -39,7 +38,7 @@ static void put_ply_header(bx_writer *w, const batten_mesh *mesh) {
     batten_mesh_field(mesh, f, &name, &components);
     for (size_t c = 0; c < components; c++) {
       bx_put_text(w, "property double ");
-      put_word(w, name);
+      bx_put_word(w, name);
       if (components > 1) bx_print(w, "_%zu", c);
       bx_put_text(w, "\n");
     }
@@ -125,6 +124,11 @@ static batten_status check_stl(batten_context *ctx, const batten_mesh *mesh, con
   return BATTEN_OK;
 }
 
+static batten_status check_vtk(batten_context *ctx, const batten_mesh *mesh, const char *path) {
+  if (batten_mesh_vertex_count(mesh) <= INT32_MAX) return BATTEN_OK;
+  return batten_fail(ctx, BATTEN_E_TOO_LARGE, "%s: .vtk counts vertices in 31 bits; write .vtp", bx_short_path(path));
+}
+
 static void write_stl(bx_writer *w, const batten_mesh *mesh) {
   const double *x = batten_mesh_vertices(mesh);
   const uint32_t *t = batten_mesh_triangles(mesh);
@@ -157,12 +161,14 @@ batten_status batten_write_mesh(batten_context *ctx, const batten_mesh *mesh, co
                                                     : format == BX_STL ? write_stl
                                                     : format == BX_VTP ? bx_write_vtp
                                                     : format == BX_VTU ? bx_write_vtu
+                                                    : format == BX_VTK ? bx_write_vtk
                                                                        : NULL;
   if (!write)
     return batten_fail(ctx, BATTEN_E_INVALID,
-                       "%s: meshes are written as .ply .obj .off .stl .vtp .vtu; rename the file",
+                       "%s: meshes are written as .ply .obj .off .stl .vtp .vtu .vtk; rename the file",
                        bx_short_path(path));
   if (format == BX_STL) st = check_stl(ctx, mesh, path);
+  if (format == BX_VTK) st = check_vtk(ctx, mesh, path);
   if (st != BATTEN_OK) return st;
   bx_writer w;
   st = bx_create(&w, ctx, path);

@@ -86,6 +86,7 @@ batten_status batten_write_network(batten_context *ctx, const batten_network *ne
     case BX_OFF:
     case BX_STL:
     case BX_VTP:
+    case BX_VTK:
       return write_tessellated(ctx, network, &o, path);
     case BX_JSON:
     case BX_VTU:
@@ -99,7 +100,7 @@ batten_status batten_write_network(batten_context *ctx, const batten_network *ne
     default:
       return batten_fail(ctx, BATTEN_E_INVALID,
                          "%s: networks are written as .step .stp .iges .igs .json .vtu, and tessellated as .ply .obj "
-                         ".off .stl .vtp; rename the file",
+                         ".off .stl .vtp .vtk; rename the file",
                          bx_short_path(path));
   }
 }

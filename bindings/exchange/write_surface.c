@@ -93,6 +93,7 @@ batten_status batten_write_surface(batten_context *ctx, const batten_surface *su
     case BX_OFF:
     case BX_STL:
     case BX_VTP:
+    case BX_VTK:
       return write_tessellated(ctx, surface, &o, path);
     case BX_JSON:
     case BX_VTU:
@@ -106,7 +107,7 @@ batten_status batten_write_surface(batten_context *ctx, const batten_surface *su
     default:
       return batten_fail(ctx, BATTEN_E_INVALID,
                          "%s: surfaces are written as .step .stp .iges .igs .json .vtu, and tessellated as .ply .obj "
-                         ".off .stl .vtp; rename the file",
+                         ".off .stl .vtp .vtk; rename the file",
                          bx_short_path(path));
   }
 }

@@ -166,7 +166,7 @@ static void test_write_failures(batten_context *ctx, scratch *s) {
   batten_mesh *m = make_mesh(ctx);
   size_t before = scratch_count(s);
   T_STATUS(batten_write_mesh(ctx, m, scratch_file(s, "a.3mf")), BATTEN_E_INVALID, ctx,
-           "written as .ply .obj .off .stl .vtp .vtu");
+           "written as .ply .obj .off .stl .vtp .vtu .vtk");
   T_STATUS(batten_write_mesh(ctx, m, scratch_file(s, "a.ply.gz")), BATTEN_E_INVALID, ctx, "written as .ply");
   T_STATUS(batten_write_mesh(ctx, m, scratch_file(s, "none/a.ply")), BATTEN_E_IO, ctx, "make the directory first");
   T_STATUS(batten_write_mesh(ctx, m, NULL), BATTEN_E_INVALID, ctx, "path: NULL");
@@ -222,6 +222,31 @@ static batten_status write_again(batten_context *ctx, void *arg) {
   return batten_write_mesh(ctx, job->mesh, job->path);
 }
 
+/* The blocks of the header's text and the numbers behind it, big endian. */
+static void test_vtk_legacy(batten_context *ctx, scratch *s) {
+  batten_mesh *m = make_mesh(ctx);
+  T_OK(batten_write_mesh(ctx, m, scratch_file(s, "a.vtk")), ctx);
+  size_t size = 0, vertices = batten_mesh_vertex_count(m), triangles = batten_mesh_triangle_count(m);
+  char *bytes = (char *)file_read(s->name, &size), line[80];
+  bytes[size] = 0;
+  const char *points = strstr(bytes, " double\n");
+  snprintf(line, sizeof line, "DATASET POLYDATA\nPOINTS %zu double\n", vertices);
+  T_CHECK(points && strstr(bytes, line) && strncmp(bytes, "# vtk DataFile Version 3.0\n", 27) == 0, "header");
+  double second = batten_mesh_vertices(m)[3];
+  unsigned char big[8];
+  uint64_t bits;
+  memcpy(&bits, &second, sizeof bits);
+  for (int i = 0; i < 8; i++) big[i] = (unsigned char)(bits >> (56 - 8 * i));
+  T_CHECK(points && memcmp(points + 8 + 24, big, 8) == 0, "x of the second vertex, big endian");
+  snprintf(line, sizeof line, "\nPOLYGONS %zu %zu\n", triangles, 4 * triangles);
+  const char *polygons = points ? points + 8 + 24 * vertices : NULL;
+  T_CHECK(polygons && memcmp(polygons, line, strlen(line)) == 0, "triangles follow the points");
+  const unsigned char *corners = polygons ? (const unsigned char *)polygons + strlen(line) : NULL;
+  T_CHECK(corners && corners[3] == 3 && corners[7] == batten_mesh_triangles(m)[0], "three corners");
+  free(bytes);
+  batten_mesh_free(m);
+}
+
 static batten_status read_back(batten_context *ctx, void *arg) {
   const write_job *job = arg;
   batten_mesh *m = NULL;
@@ -255,6 +280,7 @@ int main(void) {
   test_round_trip(ctx, &s, "stl", false);
   test_vtk(ctx, &s, "a.vtp", 5);
   test_vtk(ctx, &s, "a.vtu", 6);
+  test_vtk_legacy(ctx, &s);
   test_bytes(ctx, &s);
   test_write_failures(ctx, &s);
   test_lost_memory(ctx, &s);

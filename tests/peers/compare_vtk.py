@@ -1,4 +1,4 @@
-"""Surfaces that batten writes as .vtu, .vtp and .ply, read by VTK. Prints TAP.
+"""Surfaces that batten writes as .vtu, .vtp, .vtk and .ply, read by VTK. Prints TAP.
 Usage: compare_vtk.py PROGRAM      (PROGRAM: write_surfaces)"""
 import os
 import subprocess
@@ -67,6 +67,19 @@ with tempfile.TemporaryDirectory() as folder:
         shapes = {data.GetArrayName(i): data.GetArray(i).GetNumberOfComponents() for i in range(data.GetNumberOfArrays())}
         check(shapes == {"gauss": 1, "mean": 1, "normal": 3, "place": 2}, f"{name}.vtp: fields {shapes}")
         points = vtk_to_numpy(mesh.GetPoints().GetData())
+        legacy = read(vtk.vtkPolyDataReader(), path + ".vtk")
+        check(
+            np.array_equal(points, vtk_to_numpy(legacy.GetPoints().GetData()))
+            and np.array_equal(
+                vtk_to_numpy(mesh.GetPolys().GetConnectivityArray()),
+                vtk_to_numpy(legacy.GetPolys().GetConnectivityArray()),
+            )
+            and all(
+                np.array_equal(vtk_to_numpy(data.GetArray(key)), vtk_to_numpy(legacy.GetPointData().GetArray(key)), True)
+                for key in shapes
+            ),
+            f"{name}.vtk: the same points, triangles and fields as .vtp",
+        )
         others = vtk_to_numpy(ply.GetPoints().GetData())  # VTK's reader keeps single precision
         same = points.shape == others.shape and np.abs(points - others).max() <= 1e-6 * np.abs(points).max()
         check(same and mesh.GetNumberOfPolys() == ply.GetNumberOfPolys() == 2 * 16 * 16 * int(cells),

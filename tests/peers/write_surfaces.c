@@ -1,4 +1,4 @@
-/* Surfaces of every kind for compare_vtk.py: NAME.vtu, NAME.vtp and NAME.ply, and what batten says of them at places
+/* Surfaces of every kind for compare_vtk.py: NAME.vtu, NAME.vtp, NAME.vtk and NAME.ply, and what batten says of them at places
  * in NAME.places. On stdout a line each: NAME, degrees, cells of the .vtu. write_surfaces FOLDER */
 #include <batten/exchange.h>
 
@@ -8,11 +8,11 @@
 #include "surface_sides.h"
 
 static batten_status write_one(batten_context *ctx, const surface_side_case *c, const char *folder) {
-  static const char *const extensions[] = {"vtu", "vtp", "ply"};
+  static const char *const extensions[] = {"vtu", "vtp", "vtk", "ply"};
   char path[600];
   batten_surface *surface = NULL;
   batten_status st = surface_sides_make(ctx, c, &surface);
-  for (int i = 0; st >= 0 && i < 3; i++) {
+  for (int i = 0; st >= 0 && i < 4; i++) {
     snprintf(path, sizeof path, "%s/%s.%s", folder, c->name, extensions[i]);
     st = batten_write_surface(ctx, surface, NULL, path);
   }

@@ -54,7 +54,7 @@ BATTEN_API void batten_cloud_free(batten_context *ctx, batten_cloud *cloud);
 BATTEN_API batten_status batten_read_mesh(batten_context *ctx, const char *path, batten_mesh **out);
 
 /* .ply (binary little endian, double; all fields, those of several components as NAME_0, NAME_1, ...), .obj, .off,
- * .stl (binary, single precision), and VTK XML .vtp and .vtu with all fields. Fails: IO, INVALID (unknown extension:
+ * .stl (binary, single precision), and VTK's XML .vtp and .vtu and older .vtk with all fields. Fails: IO, INVALID (unknown extension:
  * lists the known; STL beyond single precision), NOMEM; what stood under the name is then as it was. */
 BATTEN_API batten_status batten_write_mesh(batten_context *ctx, const batten_mesh *mesh, const char *path);
 
@@ -164,7 +164,7 @@ BATTEN_API batten_write_network_options batten_write_network_options_default(voi
  *   .iges .igs  the same faces as trimmed surfaces (entities 128, 126, 142, 144), which know of no solids
  *   .json       {"batten": "network", "version": 1, ...}; reads back to the same bits
  *   .vtu        Bezier triangles of VTK 9, exact
- *   .ply .obj .off .stl .vtp   tessellated, see batten_network_tessellate
+ *   .ply .obj .off .stl .vtp .vtk   tessellated, see batten_network_tessellate
  * Fails: IO, INVALID (unknown extension: lists the known; patches that do not meet, named by their triangles),
  * TOO_LARGE, NOMEM, CANCELLED; what stood under the name is then as it was. */
 BATTEN_API batten_status batten_write_network(batten_context *ctx, const batten_network *network,
@@ -195,7 +195,7 @@ BATTEN_API batten_write_surface_options batten_write_surface_options_default(voi
  *   .iges .igs  entity 128 as a face with its natural bounds (144)
  *   .json       {"batten": "surface", "version": 1, ...}; reads back to the same bits
  *   .vtu        Bezier quadrilaterals of VTK 9, one a span pair, exact; cell data "domain": u_0, u_1, v_0, v_1
- *   .ply .obj .off .stl .vtp   tessellated, see batten_surface_tessellate
+ *   .ply .obj .off .stl .vtp .vtk   tessellated, see batten_surface_tessellate
  * Fails: IO, INVALID (unknown extension: lists the known; STEP and IGES: the control points span no area; STEP: two
  * neighbouring sides are points), TOO_LARGE, NOMEM, CANCELLED; what stood under the name is then as it was. */
 BATTEN_API batten_status batten_write_surface(batten_context *ctx, const batten_surface *surface,
