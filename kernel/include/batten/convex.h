@@ -179,9 +179,12 @@ typedef struct batten_convex_function_info {
 
 /* Fits a spline function to points [count][3]: x, y, z = f(x, y), with f convex or concave on span pairs as
  * opt->signs has it. The surface is its graph (x, y, f(x, y)), u = x, v = y. unconstrained as above.
- * BATTEN_OK: proven, and within gap_tol of the best there is. W_STOPPED: proven, but the gap is larger (the text says
- * it). W_ACCURACY: not proven. Progress phases "fit", "certify".
- * Fails: INVALID, NOMEM, TOO_LARGE, CANCELLED. */
+ * Where all signs are equal (or 0) f is strictly convex; where +1 and -1 touch its Hessian vanishes, and what is proven
+ * is proven with info->slack. Too few points are fine: tension determines the rest.
+ * BATTEN_OK: proven, and the objective is within gap_tol of objective_lower, or within a millionth of the size of z of
+ * it, root mean square. W_STOPPED: proven, but the gap is larger (the text says it). W_ACCURACY: not proven. Progress
+ * phases "fit", "certify", and those of the quadratic programs.
+ * Fails: INVALID, NOMEM, TOO_LARGE, SINGULAR (points on a line), CANCELLED. */
 BATTEN_API batten_status batten_convex_function_fit(batten_context *ctx, size_t count, const double *points,
                                                     const batten_convex_function_options *opt, batten_surface **out,
                                                     batten_surface **unconstrained,
