@@ -17,6 +17,8 @@
 /* Rows have length 1, points size 1: violations below are left to settle(). */
 static const double TOLERANCE = 1e-11;
 
+enum { DUAL_UNKNOWNS = 600 };
+
 batten_status convex_program_new(batten_context *ctx, const convex_space *space, convex_program *out) {
   size_t n = convex_points(space), unknowns = 3 * n, size;
   convex_program p = {NULL};
@@ -219,11 +221,19 @@ static batten_status solve_part(batten_context *ctx, convex_program *p, const ba
   problem.c = &c;
   problem.lower = rows->lower;
   batten_qp_options opt = batten_qp_options_default();
+  /* For some hundred unknowns the dual engine takes less time than weighing the others against it. */
+  opt.hand_over = h->rows > DUAL_UNKNOWNS;
+  opt.engine = opt.hand_over ? BATTEN_QP_AUTO : BATTEN_QP_DUAL;
   opt.active = rows->active;
   memset(rows->active + rows->rows, 0, h->rows);
   batten_qp_solution solution = {.x = d, .active = rows->active};
   batten_qp_info info;
   batten_status st = batten_qp_solve(ctx, &problem, &opt, p->workspace, &solution, &info);
+  if (!opt.hand_over && (st == BATTEN_W_ACCURACY || st == BATTEN_E_LIMIT || st == BATTEN_E_INFEASIBLE)) {
+    opt.engine = BATTEN_QP_AUTO;
+    opt.hand_over = 1;
+    st = batten_qp_solve(ctx, &problem, &opt, p->workspace, &solution, &info);
+  }
   if (st == BATTEN_W_STOPPED) /* no limit was set: the host asked for it */
     return batten_fail(ctx, BATTEN_E_CANCELLED, "cancelled by the host during quadratic program");
   *solved = st == BATTEN_OK || st == BATTEN_W_ACCURACY;

@@ -52,8 +52,10 @@ batten_status qp_choose(batten_context *ctx, const qp_task *task, const batten_q
   cost[BATTEN_QP_PRIMAL] = saturated_sum(factor, qp_primal_cost(task->rows));
   bool hopeless = cost[BATTEN_QP_DUAL].bytes > left || cost[BATTEN_QP_DUAL].flops > HOPELESS;
   hopeless = hopeless && (cost[BATTEN_QP_PRIMAL].bytes > left || cost[BATTEN_QP_PRIMAL].flops > HOPELESS);
-  if (!exactly && hopeless) {
-    cost[BATTEN_QP_INTERIOR] = (qp_cost){0, AFFORDABLE}; /* whatever it costs: not worth an ordering to know */
+  bool asked = !o->hand_over && (o->engine == BATTEN_QP_DUAL || o->engine == BATTEN_QP_PRIMAL);
+  if (!exactly && (hopeless || asked)) {
+    cost[BATTEN_QP_INTERIOR] = (qp_cost){0, AFFORDABLE}; /* whatever it costs, or never asked: not worth an
+                                                        ordering to know */
   } else if (exactly || n > ALWAYS_DENSE) {
     batten_status st = interior_cost(ctx, task, &cost[BATTEN_QP_INTERIOR]);
     if (st < 0 && st != BATTEN_E_TOO_LARGE) return st;
