@@ -52,7 +52,7 @@ static const cli_option table[] = {
      "of the parameters in the file, or of x and y with --function; default their range"},
     {"tension", OPT_TENSION, "W",
      "weight of stiffness beside the mean square distance; default 1e-6, with --function 1e-8"},
-    {"rounds", OPT_ROUNDS, "N", "of inequalities and quadratic program at most; default 10, with --function 6"},
+    {"rounds", OPT_ROUNDS, "N", "of inequalities and quadratic program at most; default 10"},
     {"parameters", OPT_PARAMETERS, "HOW",
      "project (into the best plane), floater (shape preserving, on the triangles of the\n"
      "file or those of Delaunay) or file (columns u v); default auto: file, else project"},

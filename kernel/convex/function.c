@@ -20,7 +20,7 @@ batten_convex_function_options batten_convex_function_options_default(void) {
                                           .domain = {{NAN, NAN}, {NAN, NAN}},
                                           .tension = 1e-8,
                                           .gap_tol = 1e-3,
-                                          .rounds = 6};
+                                          .rounds = 10};
 }
 
 typedef struct function_fit {
