@@ -241,7 +241,7 @@ static batten_status solve_part(batten_context *ctx, convex_program *p, const ba
   return *solved || (st != BATTEN_E_NOMEM && st != BATTEN_E_CANCELLED && st != BATTEN_E_TOO_LARGE) ? BATTEN_OK : st;
 }
 
-/* control = free + d, moved towards the reference until all rows hold. */
+/* control = free + d, moved towards the reference until all rows hold, to rounding of their sums. */
 static void settle(const convex_rows *rows, const double *free, const double *d, const double *reference,
                    double *control) {
   size_t unknowns = rows->matrix.columns;
