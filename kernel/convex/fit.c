@@ -225,7 +225,7 @@ static batten_status next_rows(fit *f, double part) {
 }
 
 static batten_status first_rows(fit *f) {
-  bool accepted;
+  bool accepted = false;
   double start = batten_now();
   batten_status st = convex_rows_make(f->ctx, &f->space, f->reference, &f->row_options, &accepted, &f->rows);
   f->info.time_rows_s += batten_now() - start;
@@ -245,7 +245,7 @@ static batten_status free_is_convex(fit *f, bool *convex) {
 
 /* One round of the convex track: f->trial. */
 static batten_status solve_round(fit *f, unsigned round, double part) {
-  bool convex, solved;
+  bool convex = false, solved = false;
   convex_objective_set(&f->objective, &f->space, f->convex.parameters);
   batten_status st = convex_objective_solve(f->ctx, &f->objective, &f->space, f->w, f->free);
   if (st >= 0) st = free_is_convex(f, &convex);
@@ -262,7 +262,7 @@ static batten_status solve_round(fit *f, unsigned round, double part) {
   double start = batten_now();
   st = convex_program_solve(f->ctx, &f->program, &f->objective, &f->space, f->w, &f->rows, f->free, f->reference,
                             f->trial, &f->info.rows_active, &solved);
-  if (!solved) memcpy(f->trial, f->reference, 3 * f->objective.n * sizeof *f->trial);
+  if (st >= 0 && !solved) memcpy(f->trial, f->reference, 3 * f->objective.n * sizeof *f->trial);
   f->info.time_qp_s += batten_now() - start;
   return st;
 }
