@@ -194,18 +194,28 @@ static size_t list_triangles(const subdivision *s, const uint32_t *index, uint32
   return count;
 }
 
-/* xy [n][2]: the places in lexicographic order, scaled by a power of two to about 1; index [n]: the lowest index
- * there; first [count]: that index for each point, or NULL. Returns n. */
-static uint32_t find_places(size_t count, const double *points, const uint32_t *order, double *xy, uint32_t *index,
-                            uint32_t *first) {
+/* scaled [count][2]: by a power of two to about 1, and rounded to multiples of 2^-256, which moves nothing above
+ * 2^-204: products of four differences then neither over- nor underflow, so that signs are exact for all input. */
+static void scale_points(size_t count, const double *points, double *scaled) {
   double largest = 0;
   for (size_t i = 0; i < 2 * count; i++) largest = fmax(largest, fabs(points[i]));
   double unit = largest > 0 ? batten_unit(largest) : 1;
+  for (size_t i = 0; i < 2 * count; i++) scaled[i] = rint(points[i] * unit * 0x1p256) * 0x1p-256;
+}
+
+/* xy [n][2]: the places in lexicographic order; index [n]: the lowest index there; first [count]: that index for each
+ * point, or NULL. Returns n. */
+static uint32_t find_places(size_t count, const double *scaled, const uint32_t *order, double *xy, uint32_t *index,
+                            uint32_t *first) {
   uint32_t n = 0;
   for (size_t i = 0; i < count; i++) {
-    double *place = xy + 2 * (size_t)n; /* compared after scaling, which may have put the least to zero */
-    for (size_t k = 0; k < 2; k++) place[k] = points[2 * (size_t)order[i] + k] * unit;
-    if (n == 0 || place[0] != place[-2] || place[1] != place[-1]) index[n++] = order[i];
+    const double *p = scaled + 2 * (size_t)order[i];
+    double *place = xy + 2 * (size_t)n;
+    if (n == 0 || p[0] != place[-2] || p[1] != place[-1]) {
+      place[0] = p[0];
+      place[1] = p[1];
+      index[n++] = order[i];
+    }
     if (first) first[order[i]] = index[n - 1];
   }
   return n;
@@ -217,11 +227,14 @@ batten_status batten_mesh_delaunay(batten_context *ctx, size_t count, const doub
   if (count > NONE / 6)
     return batten_fail(ctx, BATTEN_E_TOO_LARGE, "count: %zu points; at most %u can be triangulated", count, NONE / 6);
   uint32_t *order = batten_alloc_array(ctx, count, sizeof *order), *index = NULL, *out = NULL;
-  double *xy = NULL;
+  double *scaled = order ? batten_alloc_array(ctx, count, 2 * sizeof *scaled) : NULL, *xy = NULL;
   edge *edges = NULL;
   hull *hulls = NULL;
   size_t found = 0;
-  batten_status st = order ? batten_sort_points(ctx, 2, count, points, order) : BATTEN_E_NOMEM;
+  batten_status st = BATTEN_E_NOMEM;
+  if (!scaled) goto done;
+  scale_points(count, points, scaled);
+  st = batten_sort_points(ctx, 2, count, scaled, order);
   if (st < 0) goto done;
   st = BATTEN_E_NOMEM;
   xy = batten_alloc_array(ctx, count, 2 * sizeof *xy);
@@ -229,7 +242,7 @@ batten_status batten_mesh_delaunay(batten_context *ctx, size_t count, const doub
   edges = index ? batten_alloc_array(ctx, 6 * count, sizeof *edges) : NULL;
   hulls = edges ? batten_alloc_array(ctx, count / 2, sizeof *hulls) : NULL;
   if (!hulls) goto done;
-  uint32_t n = find_places(count, points, order, xy, index, first);
+  uint32_t n = find_places(count, scaled, order, xy, index, first);
   subdivision s = {.xy = xy, .edges = edges, .free = NONE};
   if (n >= 2) triangulate(&s, n, hulls);
   found = list_triangles(&s, index, NULL);
@@ -245,6 +258,7 @@ done:
   batten_free(ctx, edges);
   batten_free(ctx, index);
   batten_free(ctx, xy);
+  batten_free(ctx, scaled);
   batten_free(ctx, order);
   return st;
 }

@@ -227,6 +227,41 @@ static void test_special(void) {
   check_delaunay("a flat parabola and a far point", 61, p);
 }
 
+/* Coordinates of all sizes at once, some of which vanish beside others: each point is a corner, or at the place of
+ * one. */
+static void test_ranges(void) {
+  enum { N = 200, TRIALS = 300 };
+  batten_context *ctx = t_context(NULL, NULL, 1);
+  double p[2 * N];
+  uint32_t first[N], *triangles = NULL;
+  size_t wrong = 0, largest = 0;
+  uint64_t seed = 19;
+  for (int trial = 0; trial < TRIALS; trial++) {
+    size_t n = 3 + t_random(&seed) % (N - 2), triangle_count = 0;
+    for (size_t i = 0; i < 2 * n; i++) {
+      int lower = (int)(t_random(&seed) % 1060);
+      p[i] = trial % 2 ? ldexp(t_uniform(&seed) - 0.5, -lower) : (double)(t_random(&seed) % 5) * 0x1p-1074;
+    }
+    p[0] = trial % 2 ? p[0] : 1e300;
+    T_OK(batten_mesh_delaunay(ctx, n, p, first, &triangle_count, &triangles), ctx);
+    bool used[N] = {false};
+    for (size_t t = 0; t < triangle_count; t++) {
+      const uint32_t *c = triangles + 3 * t;
+      for (int k = 0; k < 3; k++) used[c[k]] = true;
+    }
+    for (size_t i = 0; i < n; i++) {
+      wrong += first[i] > i || first[first[i]] != first[i];
+      wrong += triangle_count > 0 && !used[first[i]];
+      for (size_t k = 0; k < 2; k++) wrong += fabs(p[2 * first[i] + k] - p[2 * i + k]) > 0x1p-255 * fabs(p[0] + 1);
+    }
+    if (triangle_count > largest) largest = triangle_count;
+    batten_free(ctx, triangles);
+  }
+  T_CHECK(wrong == 0 && largest > 100, "coordinates down to 1e-320 beside 1: %zu wrong, up to %zu triangles", wrong,
+          largest);
+  batten_context_free(ctx);
+}
+
 /* ---- invariance, cost, failures ------------------------------------------------------------------- */
 
 static int compare_triples(const void *a, const void *b) { return memcmp(a, b, 3 * sizeof(uint32_t)); }
@@ -323,6 +358,7 @@ int main(void) {
   test_incircle_ulp();
   test_random();
   test_special();
+  test_ranges();
   test_invariance();
   test_time();
   test_failures();
