@@ -32,6 +32,7 @@ void surface_print_form(const batten_surface_form *form) {
 void surface_report_convexity(const batten_convexity *c, cli_report *r) {
   cli_report_bool(r, "certified", c->certified != 0);
   cli_report_bool(r, "flat", c->flat != 0);
+  cli_report_bool(r, "creased", c->creased != 0);
   cli_report_integer(r, "sign", c->sign);
   cli_report_number(r, "margin_min", c->margin_min);
   cli_report_number(r, "margin_u", c->worst_at[0]);
@@ -74,6 +75,9 @@ void surface_print_convexity(const batten_convexity *c) {
              c->graph ? "; no folds" : "");
   else if (c->flat)
     cli_line("convexity", "a plane");
+  else if (c->creased)
+    cli_line("convexity", "not proven: there is a crease near u = %.4g, v = %.4g that turns the wrong way",
+             c->worst_at[0], c->worst_at[1]);
   else
     cli_line("convexity", "not proven: Gaussian curvature %.4g near u = %.4g, v = %.4g", c->margin_min,
              c->worst_at[0], c->worst_at[1]);

@@ -36,7 +36,7 @@ typedef struct certifier {
 /* What was found with L', M', N' multiplied by one sign. */
 typedef struct verdict {
   certify_proof proof;
-  bool certified, flat;
+  bool certified, creased;
   int sign; /* that L' has, times the sign; 2 while there is none, 0 when it is not one */
 } verdict;
 
@@ -112,35 +112,17 @@ static size_t lay_out(certifier *c) {
 
 /* ---- one span pair -------------------------------------------------------------------------------- */
 
-/* Jet, cross product and forms; data_error as in certify_jet_make. */
-static void make_forms(certifier *c, size_t mu, size_t nu, double data_error) {
+/* Jet, cross product and forms. */
+static void make_forms(certifier *c, size_t mu, size_t nu) {
   static const int second[3] = {CERTIFY_UU, CERTIFY_UV, CERTIFY_VV};
   unsigned m = c->degree[0], n = c->degree[1];
-  certify_jet_make(c->surface, mu, nu, c->unit, data_error, c->room, &c->jet);
-  certify_cross(&c->jet, c->cross);
+  certify_jet_make(c->surface, mu, nu, c->unit, 0, c->room, &c->jet);
+  certify_cross(c->jet.part[CERTIFY_U], c->jet.part[CERTIFY_V], c->cross);
   for (unsigned k = 0; k < 3; k++) {
     certify_clear(&c->form[k], 3 * m - 3 + k, 3 * n - 1 - k);
     for (int x = 0; x < 3; x++) certify_add_product(&c->form[k], 1, &c->jet.part[second[k]][x], &c->cross[x], 3);
     certify_summed(&c->form[k]);
   }
-}
-
-static bool forms_vanish(const certifier *c) {
-  for (int k = 0; k < 3; k++)
-    if (c->form[k].most > c->form[k].error) return false;
-  return true;
-}
-
-/* To rounding of the control points too. Leaves the forms as they were. */
-static bool is_flat(certifier *c, size_t mu, size_t nu) {
-  /* 1e-3: no rounding makes more of points of size 1 unless they are so far away that nothing is left of them. */
-  double most = fmax(c->form[0].most, fmax(c->form[1].most, c->form[2].most));
-  if (forms_vanish(c)) return true;
-  if (most > 1e-3) return false;
-  make_forms(c, mu, nu, c->rounding);
-  bool flat = forms_vanish(c);
-  make_forms(c, mu, nu, 0);
-  return flat;
 }
 
 static void collect_normals(certifier *c) {
@@ -153,13 +135,21 @@ static void collect_normals(certifier *c) {
     }
 }
 
-/* The slack in the units of the jet's L' and N', not above it; a slack too large for a double is cut. */
+/* The slack in the units of the jet's L' and N', not above it; a slack too large for a double is cut. In halves and
+ * exponents, since parts of the product may be beyond doubles where the whole is not. */
 static double local_slack(const certifier *c, int direction) {
-  double slack = c->opt->slack, factor = c->unit;
   const double along = c->jet.factor[direction], across = c->jet.factor[1 - direction];
-  const double parts[] = {factor, factor, factor, along, along, along, across};
-  for (size_t k = 0; k < sizeof parts / sizeof *parts; k++) slack *= parts[k];
-  return isnan(slack) ? 0 : fmin(slack * (1 - 0x1p-40), 0x1p100);
+  const double parts[] = {c->opt->slack, c->unit, c->unit, c->unit, along, along, along, across};
+  double slack = 1 - 0x1p-40;
+  int exponent = 0;
+  /* Spans that long or short may have lost digits. */
+  if (!(fmin(along, across) > 0x1p-1000 && fmax(along, across) < 0x1p1000)) return 0;
+  for (size_t k = 0; k < sizeof parts / sizeof *parts; k++) {
+    int e;
+    slack *= frexp(parts[k], &e);
+    exponent += e;
+  }
+  return exponent > 100 ? fmin(slack, 0.5) * 0x1p100 : ldexp(slack, exponent);
 }
 
 /* The forms times sign, and with the slack. */
@@ -240,9 +230,8 @@ static bool prove_apart(const certifier *c, verdict *v) {
 
 /* asked: what is to be shown of the span pair, 0 nothing; either: the sign is free but must be one. */
 static batten_status certify_pair(certifier *c, size_t mu, size_t nu, int asked, bool either, verdict *v) {
-  make_forms(c, mu, nu, 0);
+  make_forms(c, mu, nu);
   collect_normals(c);
-  v->flat = v->flat && is_flat(c, mu, nu);
   if (asked == 0) return BATTEN_OK;
   certify_square s;
   apply_slack(c, asked);
@@ -262,11 +251,54 @@ static batten_status certify_pair(certifier *c, size_t mu, size_t nu, int asked,
   return BATTEN_OK;
 }
 
+/* What was asked for, or found, of span pair k. */
+static int sign_of_pair(const certifier *c, const verdict *v, size_t k) {
+  return c->opt->signs ? c->opt->signs[k] : v->sign;
+}
+
+/* The crease before span `after` in direction axis, along span nu of the other one; rounding of the control points
+ * counts, or no two sides would join smoothly. */
+static void certify_side(certifier *c, int axis, size_t before, size_t after, size_t nu, int sign, verdict *v) {
+  certify_edge edge[2];
+  double at;
+  for (int k = 0; k < 2; k++) {
+    size_t mu = k ? after : before;
+    certify_jet_make(c->surface, axis == 0 ? mu : nu, axis == 0 ? nu : mu, c->unit, c->rounding, c->room, &c->jet);
+    certify_edge_make(&c->jet, axis, k == 0, &edge[k]);
+  }
+  if (certify_crease(&edge[0], &edge[1], axis, sign, c->faces, &at)) return;
+  v->certified = false;
+  v->creased = true;
+  v->proof.least_at[axis] = c->surface->space[axis].knots[after];
+  v->proof.least_at[1 - axis] = surface_span_at(&c->surface->space[1 - axis], nu, at);
+}
+
+/* Creases between span pairs of the same sign, until one is found that turns the wrong way. */
+static batten_status certify_creases(certifier *c, verdict *v) {
+  for (int axis = 0; axis < 2; axis++) {
+    const bspline *across = &c->surface->space[axis], *along = &c->surface->space[1 - axis];
+    size_t step[2] = {axis == 0 ? c->spans[1] : 1, axis == 0 ? 1 : c->spans[1]}, i = 0;
+    for (size_t mu = bspline_first(across), next; (next = bspline_next(across, mu)) < across->count; mu = next, i++) {
+      if (next - mu < across->degree) continue;
+      batten_status st = batten_progress(c->ctx, "certify", 1);
+      if (st < 0) return st;
+      size_t pair = i * step[0];
+      for (size_t nu = bspline_first(along); nu < along->count; nu = bspline_next(along, nu), pair += step[1]) {
+        int sign = sign_of_pair(c, v, pair);
+        if (sign == 0 || sign != sign_of_pair(c, v, pair + step[0])) continue;
+        certify_side(c, axis, mu, next, nu, sign, v);
+        if (!v->certified) return BATTEN_OK;
+      }
+    }
+  }
+  return BATTEN_OK;
+}
+
 /* sign: of the forms where one sign is free. */
 static batten_status certify_all(certifier *c, int sign, verdict *v) {
   const bspline *u = &c->surface->space[0], *w = &c->surface->space[1];
   const signed char *signs = c->opt->signs;
-  *v = (verdict){.certified = true, .flat = true, .sign = 2};
+  *v = (verdict){.certified = true, .sign = 2};
   v->proof = (certify_proof){
       .depth_max = c->opt->depth_max, .box_limit = c->opt->box_limit, .least = INFINITY, .bound = INFINITY};
   c->normal_count = 0;
@@ -280,7 +312,7 @@ static batten_status certify_all(certifier *c, int sign, verdict *v) {
       if (st >= 0) st = certify_pair(c, mu, nu, signs ? signs[at] : sign, !signs, v);
       if (st < 0) return st;
     }
-  return BATTEN_OK;
+  return v->certified ? certify_creases(c, v) : BATTEN_OK;
 }
 
 static bool prove_graph(certifier *c, double direction[3]) {
@@ -289,7 +321,7 @@ static bool prove_graph(certifier *c, double direction[3]) {
   for (size_t mu = bspline_first(u); mu < u->count; mu = bspline_next(u, mu))
     for (size_t nu = bspline_first(w); nu < w->count; nu = bspline_next(w, nu)) {
       certify_jet_make(c->surface, mu, nu, c->unit, 0, c->room, &c->jet);
-      certify_cross(&c->jet, c->cross);
+      certify_cross(c->jet.part[CERTIFY_U], c->jet.part[CERTIFY_V], c->cross);
       if (!certify_faces(c->cross, direction, c->faces)) return false;
     }
   return true;
@@ -306,19 +338,41 @@ static int common_sign(const certifier *c) {
   return sign;
 }
 
+/* All control points in one plane to their rounding: the one through the first, the furthest from it and the furthest
+ * from the line of both, of which all others are combinations with small factors. */
+static bool is_flat(const certifier *c) {
+  size_t count = c->surface->space[0].count * c->surface->space[1].count;
+  const double *points = c->surface->control_points;
+  double along[3] = {0}, across[3] = {0}, off[3] = {0};
+  for (int pass = 0; pass < 3; pass++)
+    for (size_t i = 0; i < count; i++) {
+      double p[3];
+      for (int x = 0; x < 3; x++) p[x] = c->unit * points[3 * i + (size_t)x] - c->unit * points[x];
+      double *furthest = pass == 0 ? along : pass == 1 ? across : off;
+      for (int k = 0; k < pass; k++) {
+        const double *axis = k == 0 ? along : across;
+        double part = vec_dot(axis, axis) > 0 ? vec_dot(p, axis) / vec_dot(axis, axis) : 0;
+        for (int x = 0; x < 3; x++) p[x] -= part * axis[x];
+      }
+      if (vec_norm(p) > vec_norm(furthest)) memcpy(furthest, p, sizeof p);
+    }
+  return vec_norm(off) <= 4 * c->rounding;
+}
+
 static void report(certifier *c, const verdict *v, batten_convexity *out) {
   const certify_proof *p = &v->proof;
-  double scale = c->unit * c->unit, least = p->least;
+  double unit = c->unit, least = p->least;
   batten_convexity r = {.certified = v->certified,
-                        .flat = v->flat,
+                        .flat = !(v->certified && c->opt->slack == 0) && is_flat(c),
+                        .creased = v->creased,
                         .boxes = p->boxes,
                         .depth = p->depth,
                         .unproven = p->unproven,
                         .worst_at = {p->least_at[0], p->least_at[1]}};
   if (v->certified)
-    r.margin_min = isfinite(least) ? fmax(0, fmin(CERTIFY_SHARE * least, p->bound)) * scale : 0;
+    r.margin_min = isfinite(least) ? fmax(0, fmin(CERTIFY_SHARE * least, p->bound)) * unit * unit : 0;
   else
-    r.margin_min = fmin(least, 0) * scale;
+    r.margin_min = fmin(least, 0) * unit * unit;
   if (v->certified) r.sign = c->opt->signs ? common_sign(c) : v->sign == 2 ? 0 : v->sign;
   r.graph = prove_graph(c, r.direction);
   if (!r.graph) memset(r.direction, 0, sizeof r.direction);

@@ -2,7 +2,7 @@
  *
  * certify_poly.c  products, raising, bisection       certify_jet.c  a surface's derivatives on a span pair
  * certify_box.c   proof that D > kappa V on a square  certify_direction.c  one direction against all normals
- * certify.c       what they say together
+ * certify_crease.c  sides without a common tangent    certify.c  what they say together
  *
  * A polynomial is kept by its Bernstein coefficients f_kl on the unit square with an `error` that none of them is
  * further than from the exact one, and `most` that none exceeds in size. All bounds hold in any rounding mode. */
@@ -74,12 +74,13 @@ enum {
   CERTIFY_JET_DOUBLES = (CERTIFY_DERIVATIVES + 2) * 3 * CERTIFY_NET /* two nets to work in */
 };
 
-/* room [CERTIFY_JET_DOUBLES]; data_error: what the control points themselves are taken to be off by (0 in proofs). */
+/* room [CERTIFY_JET_DOUBLES]; data_error: what the control points themselves are taken to be off by, 0 but at
+ * creases. */
 void certify_jet_make(const batten_surface *surface, size_t mu, size_t nu, double unit, double data_error,
                       double *room, certify_jet *out);
 
-/* x_u x x_v, scaled. */
-void certify_cross(const certify_jet *jet, certify_poly cross[3]);
+/* u x v, scaled. */
+void certify_cross(const certify_poly u[3], const certify_poly v[3], certify_poly cross[3]);
 
 /* ---- boxes --------------------------------------------------------------------------------------- */
 
@@ -120,6 +121,23 @@ typedef struct certify_square {
 void certify_sample(certify_proof *proof, const certify_square *square);
 /* Proves, or leaves proof->unproven > 0: then it stops. Fails: CANCELLED. */
 batten_status certify_prove(batten_context *ctx, certify_proof *proof, const certify_square *square);
+
+/* ---- creases -------------------------------------------------------------------------------------- */
+
+/* First derivatives on a side of a span pair, as polynomials along it; do not copy it. */
+typedef struct certify_edge {
+  certify_poly across[3], along[3];
+  double c[6][BATTEN_SURFACE_DEGREE_MAX + 1];
+} certify_edge;
+
+/* The side at the lower or upper end in direction axis. */
+void certify_edge_make(const certify_jet *jet, int axis, bool upper, certify_edge *out);
+
+/* True when the surface turns from the one to the other side of a knot in direction axis, less than half a turn, to
+ * where normal curvatures have the sign, or not beyond the errors of the jets. room [CERTIFY_FACES_DOUBLES]; at:
+ * where along the side (0 .. 1) it was not. */
+bool certify_crease(const certify_edge *before, const certify_edge *after, int axis, int sign, double *room,
+                    double *at);
 
 /* ---- one direction -------------------------------------------------------------------------------- */
 

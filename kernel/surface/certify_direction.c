@@ -24,6 +24,7 @@ static size_t worst_normal(size_t count, const double (*normals)[3], const doubl
 
 bool certify_direction(size_t count, const double (*normals)[3], double direction[3]) {
   double g[3] = {0};
+  if (count == 0) return false;
   for (size_t i = 0; i < count; i++)
     for (int x = 0; x < 3; x++) g[x] += normals[i][x] / (double)count;
   for (int turn = 0; turn < 256; turn++) { /* more find nothing that could be proven */

@@ -152,11 +152,10 @@ void certify_jet_make(const batten_surface *surface, size_t mu, size_t nu, doubl
   }
 }
 
-void certify_cross(const certify_jet *jet, certify_poly cross[3]) {
-  const certify_poly *u = jet->part[CERTIFY_U], *v = jet->part[CERTIFY_V];
+void certify_cross(const certify_poly u[3], const certify_poly v[3], certify_poly cross[3]) {
   for (int x = 0; x < 3; x++) {
     int y = (x + 1) % 3, z = (x + 2) % 3;
-    certify_clear(&cross[x], 2 * jet->degree[0] - 1, 2 * jet->degree[1] - 1);
+    certify_clear(&cross[x], u->degree[0] + v->degree[0], u->degree[1] + v->degree[1]);
     certify_add_product(&cross[x], 1, &u[y], &v[z], 2);
     certify_add_product(&cross[x], -1, &u[z], &v[y], 2);
     certify_summed(&cross[x]);

@@ -314,7 +314,7 @@ static void test_coefficients(batten_context *ctx) {
       form[k].c = block[3 + k];
     }
     certify_jet_make(surface, m, n, 1, 0, room, &jet);
-    certify_cross(&jet, cross);
+    certify_cross(jet.part[CERTIFY_U], jet.part[CERTIFY_V], cross);
     unsigned p = jet.degree[0], q = jet.degree[1];
     for (unsigned k = 0; k < 3; k++) {
       certify_clear(&form[k], 3 * p - 3 + k, 3 * q - 1 - k);
@@ -545,6 +545,96 @@ static void test_slack(batten_context *ctx) {
   }
 }
 
+/* ---- creases ---------------------------------------------------------------------------------------- */
+
+/* Bowls of degree 2 on two spans in direction axis, whose slopes jump by `jump` (up or down) along the knot at 1/2.
+ */
+static scene roof(int axis, double jump, double bend) {
+  scene s = graph(2, 2, (const double[MONOMIALS][MONOMIALS]){{0, 0.1, bend}, {0.2}, {bend}});
+  insert_knot(&s, axis, 0.5);
+  insert_knot(&s, axis, 0.5);
+  for (size_t i = 0; i < s.count[0]; i++)
+    for (size_t j = 0; j < s.count[1]; j++) {
+      double *p = s.points[i * s.count[1] + j];
+      p[2] += jump * fmax(p[axis] - 0.5, 0);
+    }
+  return s;
+}
+
+static void test_creases(batten_context *ctx) {
+  for (int axis = 0; axis < 2; axis++)
+    for (int sign = -1; sign <= 1; sign += 2)
+      for (int k = 0; k <= 15; k += 3) {
+        double jump = 2 * pow(10, -k) * sign;
+        scene s = roof(axis, jump, 0.5 * sign);
+        batten_convexity c = prove(ctx, &s, NULL);
+        T_CHECK(c.certified && !c.creased && c.sign == sign, "slopes in %c that jump by %g, bent to %+d: convex",
+                "uv"[axis], jump, sign);
+        s = roof(axis, -jump, 0.5 * sign);
+        c = prove(ctx, &s, NULL);
+        if (k <= 12)
+          T_CHECK(!c.certified && c.creased && c.sign == 0 && c.worst_at[axis] == 0.5 && c.margin_min == 0,
+                  "and by %g: not, at %g %g", -jump, c.worst_at[0], c.worst_at[1]);
+        batten_convexity_options o = batten_convexity_options_default();
+        signed char signs[2] = {(signed char)sign, (signed char)sign};
+        o.signs = signs;
+        if (k <= 12) T_CHECK(!prove(ctx, &s, &o).certified, "nor asked for");
+        o.slack = 1e-3;
+        if (k <= 12) T_CHECK(!prove(ctx, &s, &o).certified, "which slack does not soften");
+        o.slack = 0;
+        signs[1] = 0;
+        T_CHECK(prove(ctx, &s, &o).certified, "asked of one side alone there is no crease");
+      }
+  /* A crease that turns the right way at one end only, and by nothing in the middle. */
+  scene s = roof(0, 0, 0.5);
+  for (size_t j = 0; j < 3; j++)
+    for (size_t i = 3; i < 5; i++) s.points[i * 3 + j][2] += 0.1 * (s.points[i * 3][0] - 0.5) * (1.0 - (double)j);
+  batten_convexity c = prove(ctx, &s, NULL);
+  T_CHECK(!c.certified && c.creased && c.worst_at[0] == 0.5 && c.worst_at[1] >= 0.49, "half of a crease: at %g %g",
+          c.worst_at[0], c.worst_at[1]);
+  /* The second span goes back over the first one: every span pair is convex. */
+  s = roof(0, 0, 0.5);
+  for (size_t j = 0; j < 3; j++)
+    for (size_t i = 3; i < 5; i++) memcpy(s.points[i * 3 + j], s.points[(4 - i) * 3 + j], sizeof *s.points);
+  batten_convexity_options o = batten_convexity_options_default();
+  T_CHECK(!prove(ctx, &s, &o).certified, "turned back on itself");
+  o.signs = (const signed char[2]){1, 1};
+  T_CHECK(!prove(ctx, &s, &o).certified, "nor asked for");
+  /* Smooth surfaces of full knots, turned and moved: a bound that took creases for what rounding leaves would fail.
+   */
+  uint64_t seed = 5;
+  for (unsigned m = 2; m <= 6; m++) {
+    s = cap(m, m == 6 ? 3 : m + 1, 0.8, 0.9, 0.01, &seed);
+    bool convex = prove(ctx, &s, NULL).certified;
+    for (int axis = 0; axis < 2; axis++)
+      for (unsigned k = 0; k < s.degree[axis]; k++) insert_knot(&s, axis, axis ? 0.55 : 1 / 3.0);
+    for (size_t i = 0; i < s.count[0] * s.count[1]; i++) {
+      const double *p = s.points[i];
+      double q[3] = {0.8 * p[0] - 0.6 * p[1] + 0.1, 0.6 * p[0] + 0.8 * p[1], p[2] + 3};
+      memcpy(s.points[i], q, sizeof q);
+    }
+    c = prove(ctx, &s, NULL);
+    T_CHECK(convex && c.certified && !c.creased, "degree %u with knots to the full: certified, %zu boxes", m,
+            c.boxes);
+  }
+}
+
+/* A saddle, tiny on a tiny domain: slack far below L' must not pass for much, though parts of it overflow. */
+static void test_scaled_slack(batten_context *ctx) {
+  for (int k = -650; k <= 650; k += 130) {
+    scene s = graph(2, 2, (const double[MONOMIALS][MONOMIALS]){{0, 0, -1}, {0}, {1}});
+    for (size_t i = 0; i < 9; i++)
+      for (int x = 0; x < 3; x++) s.points[i][x] = ldexp(s.points[i][x], k);
+    for (int x = 0; x < 2; x++)
+      for (size_t i = 0; i < 6; i++) s.knots[x][i] = ldexp(s.knots[x][i], k);
+    batten_convexity_options o = batten_convexity_options_default();
+    o.slack = ldexp(1, -k); /* L' and N' are -+2 of this */
+    T_CHECK(!prove(ctx, &s, &o).certified, "a saddle times 2^%d with a slack of half its bend", k);
+    o.slack *= 2.01;
+    T_CHECK(prove(ctx, &s, &o).certified, "and of all of it");
+  }
+}
+
 /* ---- edges ------------------------------------------------------------------------------------------ */
 
 static void test_edges(batten_context *ctx) {
@@ -562,6 +652,14 @@ static void test_edges(batten_context *ctx) {
   s = graph(1, 1, (const double[MONOMIALS][MONOMIALS]){{0.5, 2}, {-1}});
   c = prove(ctx, &s, NULL);
   T_CHECK(!c.certified && c.flat, "a plane of four points");
+  s = graph(2, 1, (const double[MONOMIALS][MONOMIALS]){{0.5, 2}, {-1}});
+  insert_knot(&s, 0, 0.25);
+  insert_knot(&s, 0, 0.25);
+  T_CHECK(prove(ctx, &s, NULL).flat, "of two parts");
+  for (size_t i = 3; i < 5; i++)
+    for (size_t j = 0; j < 2; j++) s.points[2 * i + j][2] += s.points[2 * i][0] - 0.25;
+  c = prove(ctx, &s, NULL);
+  T_CHECK(!c.certified && !c.flat, "two planes with a crease are not one");
   s = graph(1, 3, (const double[MONOMIALS][MONOMIALS]){{0, 0, 1}, {0, 0.5}});
   c = prove(ctx, &s, NULL);
   T_CHECK(!c.certified && !c.flat && c.margin_min < -0.01, "ruled: K = %.3g", c.margin_min);
@@ -635,6 +733,8 @@ int main(void) {
   test_invariances(ctx);
   test_signs(ctx);
   test_slack(ctx);
+  test_creases(ctx);
+  test_scaled_slack(ctx);
   test_edges(ctx);
   test_bad(ctx);
   scene s = spot(1e-6);

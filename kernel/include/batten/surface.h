@@ -105,9 +105,10 @@ BATTEN_API batten_status batten_surface_measure(batten_context *ctx, const batte
 /* With L' = x_uu . (x_u x x_v), M' and N' likewise, K |x_u x x_v|^4 = L'N' - M'^2. On each span pair, subdivided as
  * need be, the Bernstein coefficients of this polynomial less margin |x_u x x_v|^4 must be positive by more than all
  * rounding errors together: then K > margin everywhere, the surface has a normal everywhere, and L' vanishes nowhere:
- * the sign of one value is that of all. Knows nothing of how the surface was made. It speaks of span pairs: creases
- * along inner knots that are there as often as the degree are not judged; nor is what lies far apart (graph tells
- * more). */
+ * the sign of one value is that of all. Between span pairs of the same sign, along inner knots that are there as
+ * often as the degree, the surface must turn to the side to which it bends, or have one tangent plane to rounding of
+ * the control points; slack does not matter there. Knows nothing of how the surface was made. What lies far apart is
+ * not judged (graph tells more). */
 typedef struct batten_convexity_options {
   size_t struct_size;
   const signed char *signs; /* [span pairs in u][in v] what is to be shown: +1 normal curvatures have the sign of L' >
@@ -122,15 +123,18 @@ typedef struct batten_convexity_options {
 BATTEN_API batten_convexity_options batten_convexity_options_default(void);
 
 typedef struct batten_convexity {
-  int certified;       /* non-zero: proven on every span pair of which it was asked */
-  int flat;            /* non-zero: all of L', M', N' vanish to rounding, that of the control points included: a
-                          plane, a line or a point, convex, but not strictly: certified is 0 (without slack) */
+  int certified;       /* non-zero: proven on every span pair of which it was asked, and between them */
+  int flat;            /* non-zero: all control points lie in one plane to their rounding: convex, but not strictly:
+                          certified is 0 (without slack) */
   int sign;            /* of L' when certified and one sign was asked for: +1, -1; else 0 */
   double margin_min;   /* K is proven to be larger everywhere (with slack: (L' + slack)(N' + slack) - M'^2 over |x_u x
                           x_v|^4 is), 1 / unit^2: at least nine tenths of the least K, unless depth_max or box_limit
                           ended the search (with slack it may be less). 0 when nothing was asked. When not certified:
                           the least K that was met, or 0 when all were positive */
-  double worst_at[2];  /* where the least K was met */
+  int creased;         /* non-zero: proven on all span pairs, but there is a crease near worst_at, along an inner
+                          knot that is there as often as the degree, not shown to turn to the side to which the
+                          surface bends */
+  double worst_at[2];  /* where the least K was met; the crease */
   size_t boxes;        /* that were looked at */
   unsigned depth;      /* bisections of the smallest */
   size_t unproven;     /* boxes given up; the search ends with the first */
