@@ -47,8 +47,9 @@ bool cli_take_picture(batten_picture_options *p, int key, const char *value) {
       return true;
     case CLI_KEY_SIZE:
       if (!cli_parse_numbers("--size", value, 2, pair)) return false;
-      if (!(pair[0] >= 16 && pair[0] <= 8192 && pair[1] >= 16 && pair[1] <= 8192)) {
-        cli_error("--size: '%s' is not two numbers of pixels from 16 to 8192", value);
+      if (!(pair[0] >= 16 && pair[0] <= 8192 && pair[1] >= 16 && pair[1] <= 8192) || pair[0] != floor(pair[0]) ||
+          pair[1] != floor(pair[1])) {
+        cli_error("--size: '%s' is not two whole numbers of pixels from 16 to 8192", value);
         return false;
       }
       p->width = (unsigned)pair[0];

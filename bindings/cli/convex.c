@@ -45,14 +45,16 @@ static const cli_option table[] = {
     CLI_OPTION_REPORT,
     {"degree", OPT_DEGREE, "M[,N]", "in both directions, 2 to 7; default 3"},
     {"spans", OPT_SPANS, "M[,N]",
-     "polynomial pieces in both directions; default 1 (one Bezier patch), with --function 4"},
+     "polynomial pieces in both directions, 1 to 16; default 1 (one Bezier patch); with\n--function 1 to 64, default "
+     "4"},
     {"smoothness", OPT_SMOOTHNESS, "M[,N]",
      "continuous derivatives between pieces, 1 to degree - 1; default degree - 1"},
     {"domain", OPT_DOMAIN, "U0,U1,V0,V1",
-     "of the parameters in the file, or of x and y with --function; default their range"},
+     "of the parameters u v in the file, or of x and y with --function; default their range"},
     {"tension", OPT_TENSION, "W",
      "weight of stiffness beside the mean square distance; default 1e-6, with --function 1e-8"},
-    {"rounds", OPT_ROUNDS, "N", "of inequalities and quadratic program at most; default 10"},
+    {"rounds", OPT_ROUNDS, "N",
+     "of inequalities and quadratic program at most, to 100, with --function 20; default 10"},
     {"parameters", OPT_PARAMETERS, "HOW",
      "project (into the best plane), floater (shape preserving, on the triangles of the\n"
      "file or those of Delaunay) or file (columns u v); default auto: file, else project"},
@@ -68,7 +70,7 @@ static const cli_option table[] = {
     {"unit", OPT_UNIT, "NAME", "of lengths in STEP and IGES: mm, cm, m or inch; default mm"},
     {"density", OPT_DENSITY, "N", "segments of each piece in meshes; default 16"},
     {"tolerance", OPT_TOLERANCE, "T", "meshes within T of the surface, with at most --density segments"},
-    CLI_OPTION_VIEW,
+    {"view", CLI_KEY_VIEW, "AZ,EL", "direction of the picture's camera, degrees; default 35,38"},
     CLI_OPTION_UP,
     CLI_OPTION_SIZE,
     CLI_OPTION_TITLE,
@@ -91,7 +93,7 @@ static void print_help(void) {
       "  awk 'BEGIN { srand(3); for (i = 0; i < 60; i++) { x = 2 * rand() - 1; y = 2 * rand() - 1;\n"
       "    print x, y, sqrt(4 - x * x - 2 * y * y) + 0.1 * (rand() - 0.5) } }' > points.xyz\n"
       "  batten convex points.xyz -o patch.step -o patch.json --picture patch.png --report patch.report.json\n"
-      "\nexample: values of a convex function\n\n"
+      "\nexample: values of a concave function\n\n"
       "  batten convex points.xyz --function --concave --spans 4 -o function.json\n\n"
       "exit status: 0 done (a warning on stderr and `status` in the report say when to look twice), 1 could not,\n"
       "2 wrong usage, 130 interrupted\n");
@@ -261,6 +263,9 @@ static batten_status take_parameters(convex_work *w) {
     return batten_fail(w->run.ctx, BATTEN_E_INVALID,
                        "points: no columns u and v in the file; name them in its first line, or leave --parameters");
   if (own) q->options.parameters = w->cloud.parameters;
+  if (!own && !isnan(q->options.domain[0][0]))
+    return batten_fail(w->run.ctx, BATTEN_E_INVALID,
+                       "--domain: of parameters in the file, which are not taken; add columns u and v, or leave it");
   if (q->parameters != CONVEX_FLOATER) return BATTEN_OK;
   q->options.parametrize.method = BATTEN_PARAMETERS_FLOATER;
   return read_triangles(w);
@@ -289,8 +294,8 @@ static batten_status read_input(convex_work *w) {
 
 static batten_status fit(convex_work *w) {
   const convex_request *q = w->request;
-  size_t count = w->mesh ? batten_mesh_vertex_count(w->mesh) : w->cloud.count;
-  const double *points = w->mesh ? batten_mesh_vertices(w->mesh) : w->cloud.points;
+  size_t count = w->cloud.count;
+  const double *points = w->cloud.points;
   batten_status st = q->function ? batten_convex_function_fit(w->run.ctx, count, points, &q->function_options,
                                                               &w->surface, &w->unconstrained, &w->function_info)
                                  : batten_convex_fit(w->run.ctx, count, points, &q->options, &w->surface,
@@ -316,6 +321,13 @@ static batten_status write_surface(convex_work *w, const batten_surface *surface
   return st;
 }
 
+/* Over the pictures. */
+static const char *shape_of(const convex_work *w) {
+  const convex_request *q = w->request;
+  if (!q->function) return w->info.plane ? "best plane" : "convex";
+  return q->concave ? "concave" : q->signs_file ? "shape wanted" : "convex";
+}
+
 static batten_status write_one(convex_work *w, const cli_output *f) {
   const convex_request *q = w->request;
   const char *path = f->staged ? f->staged : f->target;
@@ -325,8 +337,8 @@ static batten_status write_one(convex_work *w, const cli_output *f) {
     case CLI_OUTPUT_UNCONSTRAINED:
       return write_surface(w, w->unconstrained, f);
     case CLI_OUTPUT_SHADED:
-      return cli_convex_picture(w->run.ctx, w->unconstrained, w->surface, w->cloud.count, w->cloud.points,
-                                &q->picture, path);
+      return cli_convex_picture(w->run.ctx, w->unconstrained, w->surface, shape_of(w), w->cloud.count,
+                                w->cloud.points, &q->picture, path);
     default:
       return BATTEN_OK; /* reports come last: they tell the times of the others */
   }
@@ -382,6 +394,7 @@ int cli_convex(int argc, char **argv) {
                       .function_options = batten_convex_function_options_default(),
                       .write = batten_write_surface_options_default(),
                       .picture = batten_picture_options_default()};
+  q.picture.elevation_deg = 38; /* steep enough to see into the ellipses on the far side */
   /* The range of the parameters in the file. */
   for (int i = 0; i < 2; i++)
     for (int k = 0; k < 2; k++) q.options.domain[i][k] = NAN;

@@ -27,7 +27,7 @@ typedef struct convex_work {
   convex_request *request;
   cli_run run;
   batten_cloud cloud;
-  batten_mesh *mesh;  /* of a file with triangles, where those are wanted */
+  batten_mesh *mesh;  /* of a file with triangles, where those are wanted; its vertices are the points */
   signed char *signs; /* of --signs or --concave */
   batten_surface *surface, *unconstrained;
   batten_convex_info info;

@@ -62,7 +62,7 @@ void convex_report(const convex_work *w, cli_report *r) {
   cli_report_text(r, "command", "convex");
   cli_report_common(r, &w->run, w->status);
   cli_report_text(r, "input", w->request->common.input);
-  cli_report_count(r, "points", w->mesh ? batten_mesh_vertex_count(w->mesh) : w->cloud.count);
+  cli_report_count(r, "points", w->cloud.count);
   surface_report_form(&form, r);
   report_fit(w, r);
   surface_report_convexity(w->request->function ? &w->function_info.convexity : &w->info.convexity, r);
@@ -75,7 +75,7 @@ void convex_report(const convex_work *w, cli_report *r) {
 static void print_sums(const convex_work *w) {
   if (w->request->function) {
     const batten_convex_function_info *g = &w->function_info;
-    cli_line("sums", "unconstrained %.6g, result %.6g, which no convex one undercuts by more than %.2g %%",
+    cli_line("sums", "unconstrained %.6g, result %.6g, which none of this shape undercuts by more than %.2g %%",
              g->lsq_unconstrained, g->lsq, 100 * fmax(0, 1 - g->objective_lower / g->objective));
     cli_line("inequalities", "%zu in round %u", g->rows_per_round[g->rounds ? g->rounds - 1 : 0], g->rounds);
     cli_line("deviation", "rms %.4g, largest %.4g at point %zu", g->rms, g->max_error, g->max_error_index);
@@ -92,7 +92,7 @@ static void print_sums(const convex_work *w) {
 void convex_summary(const convex_work *w) {
   bool f = w->request->function;
   batten_surface_form form = batten_surface_get(w->surface);
-  cli_line("points", "%zu", w->mesh ? batten_mesh_vertex_count(w->mesh) : w->cloud.count);
+  cli_line("points", "%zu", w->cloud.count);
   surface_print_form(&form);
   print_sums(w);
   surface_print_convexity(f ? &w->function_info.convexity : &w->info.convexity);

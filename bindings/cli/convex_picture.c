@@ -35,7 +35,7 @@ typedef struct drawing {
   size_t level_count, zero_count;
   batten_picture_lines space_lines[LINE_KINDS], plot_line_kinds[2];
   batten_picture_axes axes;
-  char space_caption[TEXT], plot_caption[TEXT];
+  char space_caption[TEXT], plot_caption[TEXT], plot_title[TEXT];
   batten_picture_options space_options, plot_options;
 } drawing;
 
@@ -327,7 +327,8 @@ static batten_picture_lines kind(const convex_segments *s, unsigned color, doubl
   return (batten_picture_lines){s->count, s->ends, color, width, hidden};
 }
 
-static void describe(drawing *d, const batten_picture_options *view, const char *name, const char *plot_name) {
+static void describe(drawing *d, const batten_picture_options *view, const char *name) {
+  snprintf(d->plot_title, TEXT, "Gaussian curvature, %s", name);
   batten_picture_options *o = &d->space_options;
   d->space_lines[0] = kind(&d->spans, 0x3f4d63, 1.1, 0.25);
   d->space_lines[1] = (batten_picture_lines){d->level_count, d->levels, 0x14161b, 1.3, 0};
@@ -354,7 +355,7 @@ static void describe(drawing *d, const batten_picture_options *view, const char 
                                   .labels = {"u", "v", "K"}};
   o->azimuth_deg = -62;
   o->elevation_deg = 27;
-  o->title = plot_name;
+  o->title = d->plot_title;
   o->caption = d->plot_caption;
   o->colors = d->tones;
   o->line_count = 2;
@@ -400,7 +401,7 @@ static batten_status draw(batten_context *ctx, drawing *d, size_t count, const c
 }
 
 batten_status cli_convex_picture(batten_context *ctx, const batten_surface *unconstrained,
-                                 const batten_surface *convex, size_t count, const double *points,
+                                 const batten_surface *convex, const char *shape, size_t count, const double *points,
                                  const batten_picture_options *view, const char *path) {
   size_t sides = unconstrained ? 2 : 1;
   unsigned up = view->up_axis;
@@ -425,8 +426,7 @@ batten_status cli_convex_picture(batten_context *ctx, const batten_surface *unco
     st = make_levels(ctx, &d[i], up, step);
     caption(&d[i], count, step, !unconstrained);
     bool left = unconstrained && i == 0;
-    describe(&d[i], view, left ? "unconstrained" : "convex",
-             left ? "Gaussian curvature, unconstrained" : "Gaussian curvature, convex");
+    describe(&d[i], view, left ? "unconstrained" : shape);
     d[i].space_options.point_count = count;
     d[i].space_options.points = turned;
     d[i].space_options.point_scale = 0.75; /* ellipses want to be seen between them */

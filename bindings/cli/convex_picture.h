@@ -13,14 +13,15 @@
  *   below  K over (u, v), each over its own range; 0 is in it unless all K are about the same
  * Both are blue where K > 0 and red where K < 0.
  *   unconstrained  NULL: the convex surface alone, its plot beside it
+ *   shape          what the convex surface is called over its panels
  *   points         [count][3], may be none
  *   view           size, camera, up_axis and title of the picture; its other fields do not count
  *   path           .png
  * What is up: up_axis of the view for functions, and wherever the mean normal is within 15 degrees of it. Else the
- * surface is turned, with its points, so that its mean normal points up on the side to which it bulges: a patch in any
- * position is seen from outside. Level curves are heights above the plane across what is up. */
+ * surface is turned, with its points, so that its mean normal points up on the side to which it bulges: a patch in
+ * any position is seen from outside. Level curves are heights above the plane across what is up. */
 batten_status cli_convex_picture(batten_context *ctx, const batten_surface *unconstrained,
-                                 const batten_surface *convex, size_t count, const double *points,
+                                 const batten_surface *convex, const char *shape, size_t count, const double *points,
                                  const batten_picture_options *view, const char *path);
 
 /* ---- convex_lines.c: what is drawn on the surfaces ---- */

@@ -5,14 +5,22 @@
 
 #include "convex.h"
 
-/* One line into row `line` from the top; false after filling the error text. */
+/* Bytes of the UTF-8 character at the beginning of a text. */
+static int character_length(const char *text) {
+  int length = 1;
+  while (length < 4 && ((unsigned char)text[length] & 0xc0) == 0x80) length++;
+  return length;
+}
+
+/* One line into row `line` from the top. */
 static batten_status read_line(batten_context *ctx, const char *path, const char *text, size_t line, size_t nx,
                                size_t ny, signed char *signs) {
   size_t x = 0;
   for (; *text; text++) {
     if (strchr(" \t,;\r\n", *text)) continue;
     if (!strchr("+-0", *text))
-      return batten_fail(ctx, BATTEN_E_FORMAT, "%s:%zu: '%c' is no sign; give +, - or 0", path, line + 1, *text);
+      return batten_fail(ctx, BATTEN_E_FORMAT, "%s:%zu: '%.*s' is no sign; give +, - or 0", path, line + 1,
+                         character_length(text), text);
     if (x < nx && line < ny) signs[x * ny + ny - 1 - line] = *text == '+' ? 1 : *text == '-' ? -1 : 0;
     x++;
   }

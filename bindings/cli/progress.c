@@ -79,28 +79,57 @@ void cli_run_close(cli_run *run) {
   run->ctx = NULL;
 }
 
-/* Replaces the first `from` in text [size] by `to`, as far as it fits. */
+/* Replaces every `from` in text [size] by `to`, as far as they fit. */
 static void substitute(char *text, size_t size, const char *from, const char *to) {
-  char *at = strstr(text, from);
-  if (!at) return;
-  size_t head = (size_t)(at - text), tail = strlen(at + strlen(from)), length = strlen(to);
-  if (head + length + tail + 1 > size) return;
-  memmove(at + length, at + strlen(from), tail + 1);
-  memcpy(at, to, length);
+  size_t length = strlen(to), cut = strlen(from);
+  for (char *at = strstr(text, from); at; at = strstr(at + length, from)) {
+    if (strlen(text) - cut + length + 1 > size) return;
+    memmove(at + length, at + cut, strlen(at + cut) + 1);
+    memcpy(at, to, length);
+  }
 }
 
-void cli_run_text(const cli_run *run, batten_status status, char *text, size_t size) {
+/* Fields of options that are left: opt.rounds_tol is --rounds-tol, opt.degree[1] is --degree. */
+static void name_options(char *text) {
+  for (char *at = strstr(text, "opt."); at; at = strstr(at, "opt.")) {
+    if (at > text && at[-1] != ' ' && at[-1] != '(') { /* part of a name */
+      at += 4;
+      continue;
+    }
+    memmove(at + 2, at + 4, strlen(at + 4) + 1);
+    memcpy(at, "--", 2);
+    for (at += 2; (*at >= 'a' && *at <= 'z') || *at == '_'; at++)
+      if (*at == '_') *at = '-';
+    char *end = *at == '[' ? strchr(at, ']') : NULL;
+    if (end) memmove(at, end + 1, strlen(end + 1) + 1);
+  }
+}
+
+/* Length of the input's name at the beginning of a text, 0 when it is not there. Long names are cut from the left. */
+static size_t named_input(const char *own, const char *input) {
+  size_t head = strcspn(own, ":"), length = input ? strlen(input) : 0;
+  return head <= length && strncmp(input + length - head, own, head) == 0 ? head : 0;
+}
+
+/* Whether a text is about what the input holds. */
+static bool about_input(const char *own) {
+  static const char *const words[] = {"points",        "matrix",   "seeds",     "problem",        "edge",
+                                      "vert",          "triangle", "mesh",      "opt.parameters", "opt.weights",
+                                      "opt.triangles", "count",    "parameters"};
+  for (size_t i = 0; i < sizeof words / sizeof *words; i++)
+    if (strncmp(own, words[i], strlen(words[i])) == 0) return true;
+  return false;
+}
+
+/* What the library calls otherwise than the command line, or does not offer as the remedy. */
+static void use_words(char *text, size_t size) {
   static const char *const words[][2] = {
-      {"opt.merge_radius", "--merge-radius"},
       {"opt.lower and opt.upper", "--box"},
       {"opt.evaluations_max", "evaluations"},
       {"opt.normals", "normals in the file"},
       {"opt.spline.smoothing", "--smoothing"},
       {"memory_limit", "--memory"},
-      {"opt.orientation", "--orientation"},
-      {"opt.cell", "--cell"},
       {"opt.width, opt.height", "--size"},
-      {"opt.carrier", "--carrier"},
       {", or opt.improve larger than 0", ""},
       {"matrix.n: ", ""},
       {"the context allows", "allowed are"},
@@ -109,37 +138,44 @@ void cli_run_text(const cli_run *run, batten_status status, char *text, size_t s
       {"batten_mesh_repair", "--repair"},
       {"opt.tolerance_relative", "--tolerance"},
       {"opt.tolerance_absolute", "--tolerance"},
-      {"opt.continuity", "--continuity"},
       {"leave it 0 or take another fill", "leave it away, or take another --fill"},
       {"opt.creases", "--crease-edges"},
       {"opt.line_vertices", "--lines"},
       {"opt.weld_radius", "--weld"},
-      {"opt.density", "--density"},
-      {"opt.tolerance", "--tolerance"},
       {"noise: ", "--smooth: "},
-      {"opt.smoothness", "--smoothness"},
-      {"opt.domain", "--domain"},
       {"opt.parametrize.triangles", "triangles"},
       {"opt.parameters", "parameters"},
       {"opt.weights", "weights"},
-      {"opt.rounds", "--rounds"},
-      {"opt.spans", "--spans"},
-      {"opt.degree", "--degree"},
       {"opt.gap_tol", "--gap"},
-      {"gap_tol", "--gap"},
-      {"count: ", ""},
-      {"triangles: ", "--faces: "},
+      {"opt.triangles", "triangles"},
+      {"opt.correction_passes", "--correction"},
+      {"opt.width x height", "--size"},
+      {"the context's limit is", "--memory allows"},
+      {"but n = 3 was asked for; take n = 2", "a column z is missing"},
+      {", or NaN for all four", ", or leave it away"},
+      {", or NaN four times", ", or leave it away"},
+      {"or all NaN there for their box", "or leave it away for their box"},
+      {"leave parameters NULL", "take --parameters project"},
+      {", or 0 for the most", ""},
+      {", 0 = the most", ""},
   };
-  const char *own = batten_error(run->ctx);
-  static const char *const about_input[] = {"points",         "matrix",      "seeds",           "problem",
-                                            "edge",           "vert",        "triangle",        "mesh",
-                                            "opt.parameters", "opt.weights", "opt.parametrize", "count"};
-  bool input = false;
-  for (size_t i = 0; i < sizeof about_input / sizeof *about_input; i++)
-    input = input || strncmp(own, about_input[i], strlen(about_input[i])) == 0;
-  snprintf(text, size, "%s%s%s", input && run->input ? run->input : "", input && run->input ? ": " : "",
-           *own ? own : batten_status_text(status));
   for (size_t i = 0; i < sizeof words / sizeof *words; i++) substitute(text, size, words[i][0], words[i][1]);
+  name_options(text);
+}
+
+void cli_run_text(const cli_run *run, batten_status status, char *text, size_t size) {
+  const char *own = batten_error(run->ctx), *input = run->input;
+  size_t head = input ? named_input(own, input) : 0; /* the name of a file stays as it is */
+  if (!*own)
+    snprintf(text, size, "%s", batten_status_text(status));
+  else if (head || !input || !about_input(own))
+    snprintf(text, size, "%s", own);
+  else {
+    head = strlen(input) + 2;
+    bool count = strncmp(own, "count: ", 7) == 0, faces = strncmp(own, "triangles: ", 11) == 0;
+    snprintf(text, size, "%s: %s%s", input, faces ? "--faces: " : "", own + (count ? 7 : faces ? 11 : 0));
+  }
+  if (head < strlen(text)) use_words(text + head, size - head);
   for (size_t i = 0; run->outputs && i < run->outputs->count; i++) {
     const cli_output *f = &run->outputs->items[i];
     if (f->staged) substitute(text, size, f->staged, f->path);

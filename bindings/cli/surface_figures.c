@@ -71,8 +71,8 @@ void surface_report_measures(const batten_surface_measures *m, cli_report *r) {
 
 void surface_print_convexity(const batten_convexity *c) {
   if (c->certified)
-    cli_line("convexity", "proven: Gaussian curvature at least %.4g, in %zu boxes%s", c->margin_min, c->boxes,
-             c->graph ? "; no folds" : "");
+    cli_line("convexity", "proven: Gaussian curvature at least %.4g, in %zu box%s%s", c->margin_min, c->boxes,
+             c->boxes == 1 ? "" : "es", c->graph ? "; no folds" : "");
   else if (c->flat)
     cli_line("convexity", "a plane");
   else if (c->creased)

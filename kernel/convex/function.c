@@ -49,20 +49,21 @@ static batten_status check_breaks(batten_context *ctx, const batten_convex_funct
                                   const double domain[2]) {
   size_t count = o->break_count[i];
   if (count >= SPANS_MAX)
-    return batten_fail(ctx, BATTEN_E_INVALID, "break_count[%d]: %zu; give at most %d", i, count, SPANS_MAX - 1);
+    return batten_fail(ctx, BATTEN_E_INVALID, "opt.break_count[%d]: %zu; give at most %d", i, count, SPANS_MAX - 1);
   if (!o->breaks[i])
-    return batten_fail(ctx, BATTEN_E_INVALID, "breaks[%d]: NULL; give [%zu] ascending numbers", i, count);
+    return batten_fail(ctx, BATTEN_E_INVALID, "opt.breaks[%d]: NULL; give [%zu] ascending numbers", i, count);
   for (size_t k = 0; k < count; k++) {
     double at = o->breaks[i][k], before = k ? o->breaks[i][k - 1] : domain[0];
     if (!(at > domain[0] && at < domain[1]))
-      return batten_fail(ctx, BATTEN_E_INVALID, "breaks[%d][%zu]: %.17g; give one inside the domain %.17g .. %.17g",
-                         i, k, at, domain[0], domain[1]);
+      return batten_fail(ctx, BATTEN_E_INVALID,
+                         "opt.breaks[%d][%zu]: %.17g; give one inside the domain %.17g .. %.17g", i, k, at, domain[0],
+                         domain[1]);
     /* 1e-6: second derivatives have the square of it as a unit */
     if (!(at - before > 1e-6 * (domain[1] - domain[0])) ||
         (k + 1 == count && !(domain[1] - at > 1e-6 * (domain[1] - domain[0]))))
       return batten_fail(ctx, BATTEN_E_INVALID,
-                         "breaks[%d][%zu]: %.17g; breaks must ascend, by a millionth of the domain at least", i, k,
-                         at);
+                         "opt.breaks[%d][%zu]: %.17g; breaks must ascend, by a millionth of the domain at least", i,
+                         k, at);
   }
   return BATTEN_OK;
 }
@@ -73,19 +74,19 @@ static batten_status check_options(batten_context *ctx, const batten_convex_func
   if (st < 0) return st;
   for (int i = 0; i < 2; i++) {
     if (o->degree[i] < 2 || o->degree[i] > 7)
-      return batten_fail(ctx, BATTEN_E_INVALID, "degree[%d]: %u; give 2 to 7", i, o->degree[i]);
+      return batten_fail(ctx, BATTEN_E_INVALID, "opt.degree[%d]: %u; give 2 to 7", i, o->degree[i]);
     if (o->break_count[i] == 0 && (o->spans[i] < 1 || o->spans[i] > SPANS_MAX))
-      return batten_fail(ctx, BATTEN_E_INVALID, "spans[%d]: %u; give 1 to %d", i, o->spans[i], SPANS_MAX);
+      return batten_fail(ctx, BATTEN_E_INVALID, "opt.spans[%d]: %u; give 1 to %d", i, o->spans[i], SPANS_MAX);
     if (o->smoothness[i] >= o->degree[i])
-      return batten_fail(ctx, BATTEN_E_INVALID, "smoothness[%d]: %u; degree %u allows 1 to %u, 0 = the most", i,
+      return batten_fail(ctx, BATTEN_E_INVALID, "opt.smoothness[%d]: %u; degree %u allows 1 to %u, 0 = the most", i,
                          o->smoothness[i], o->degree[i], o->degree[i] - 1);
   }
   if (!(o->tension >= 0) || !isfinite(o->tension))
-    return batten_fail(ctx, BATTEN_E_INVALID, "tension: %g; give a number >= 0", o->tension);
+    return batten_fail(ctx, BATTEN_E_INVALID, "opt.tension: %g; give a number >= 0", o->tension);
   if (!(o->gap_tol > 0) || !isfinite(o->gap_tol))
-    return batten_fail(ctx, BATTEN_E_INVALID, "gap_tol: %g; give a number > 0", o->gap_tol);
+    return batten_fail(ctx, BATTEN_E_INVALID, "opt.gap_tol: %g; give a number > 0", o->gap_tol);
   if (o->rounds < 1 || o->rounds > FUNCTION_ROUNDS_MAX)
-    return batten_fail(ctx, BATTEN_E_INVALID, "rounds: %u; give 1 to %d", o->rounds, FUNCTION_ROUNDS_MAX);
+    return batten_fail(ctx, BATTEN_E_INVALID, "opt.rounds: %u; give 1 to %d", o->rounds, FUNCTION_ROUNDS_MAX);
   return BATTEN_OK;
 }
 
@@ -94,11 +95,11 @@ static batten_status check_weights(function_fit *f) {
   double largest = 0;
   for (size_t k = 0; weights && k < f->count; k++) {
     if (!(weights[k] >= 0) || !isfinite(weights[k]))
-      return batten_fail(f->ctx, BATTEN_E_INVALID, "weights[%zu]: %g; give numbers >= 0", k, weights[k]);
+      return batten_fail(f->ctx, BATTEN_E_INVALID, "opt.weights[%zu]: %g; give numbers >= 0", k, weights[k]);
     largest = fmax(largest, weights[k]);
   }
   if (weights && largest == 0)
-    return batten_fail(f->ctx, BATTEN_E_INVALID, "weights: all are 0; give one above 0 at least");
+    return batten_fail(f->ctx, BATTEN_E_INVALID, "opt.weights: all are 0; give one above 0 at least");
   return BATTEN_OK;
 }
 
@@ -122,13 +123,13 @@ static batten_status find_domain(function_fit *f) {
           i ? 'y' : 'x', d[0]);
     if (!(d[0] < d[1]) || !isfinite(d[1] - d[0]) || !isnormal(d[1] - d[0]))
       return batten_fail(f->ctx, BATTEN_E_INVALID,
-                         "domain[%d]: %g to %g; give two ascending numbers, or NaN four times", i, d[0], d[1]);
+                         "opt.domain[%d]: %g to %g; give two ascending numbers, or NaN four times", i, d[0], d[1]);
     for (size_t k = 0; k < f->count; k++) {
       double at = f->points[3 * k + (size_t)i];
       if (at < d[0] || at > d[1])
         return batten_fail(f->ctx, BATTEN_E_INVALID,
-                           "points[%zu]: %c = %.17g is outside the domain %.17g .. %.17g; remove it, or widen the "
-                           "domain",
+                           "points[%zu]: %c = %.17g is outside the domain %.17g .. %.17g; remove it, or widen "
+                           "opt.domain",
                            k, i ? 'y' : 'x', at, d[0], d[1]);
     }
   }
@@ -156,7 +157,7 @@ static batten_status check(function_fit *f) {
   }
   for (size_t k = 0; st == BATTEN_OK && f->opt.signs && k < f->space.spans[0] * f->space.spans[1]; k++)
     if (f->opt.signs[k] < -1 || f->opt.signs[k] > 1)
-      st = batten_fail(f->ctx, BATTEN_E_INVALID, "signs[%zu][%zu]: %d; give -1, 0 or 1", k / f->space.spans[1],
+      st = batten_fail(f->ctx, BATTEN_E_INVALID, "opt.signs[%zu][%zu]: %d; give -1, 0 or 1", k / f->space.spans[1],
                        k % f->space.spans[1], f->opt.signs[k]);
   return st;
 }
@@ -468,13 +469,13 @@ static batten_status judge(const function_fit *f, const batten_convex_function_i
   double gap = info->objective - info->objective_lower;
   if (!info->convexity.certified)
     return batten_fail(f->ctx, BATTEN_W_ACCURACY,
-                       "convexity is not proven near (%g, %g); use fewer spans, or more rounds",
+                       "convexity is not proven near (%g, %g); use fewer spans, or raise opt.rounds",
                        info->convexity.worst_at[0], info->convexity.worst_at[1]);
   if (gap > f->opt.gap_tol * info->objective_lower + floor / (f->scale * f->scale))
     return batten_fail(
         f->ctx, BATTEN_W_STOPPED,
         "the mean square with tension is %.6g, that of the best such function at least %.6g: more than "
-        "gap_tol = %g apart; use more rounds",
+        "opt.gap_tol = %g apart; raise opt.rounds",
         info->objective, info->objective_lower, f->opt.gap_tol);
   return BATTEN_OK;
 }

@@ -307,7 +307,7 @@ static batten_status start(rounds_state *s, double *unconstrained) {
   batten_status st = minimise(s, NULL, true, NULL, NULL, s->outer, NULL, &s->lower, &solved);
   if (st < 0) return st;
   if (!solved)
-    return batten_fail(s->ctx, BATTEN_E_SINGULAR, "points: they do not determine the spline; raise tension");
+    return batten_fail(s->ctx, BATTEN_E_SINGULAR, "points: they do not determine the spline; raise opt.tension");
   s->lower = fmax(s->lower, 0);
   memcpy(unconstrained, s->outer, n * sizeof *unconstrained);
   s->scale = fmax(curvature_scale(s->space, s->outer), s->opt->noise);

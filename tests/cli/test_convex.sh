@@ -65,6 +65,32 @@ run 1 "same.xyz: points" convex same.xyz -o x.step
 printf '0 0 0\n1 0 0\n0 1 0\n1 1 1\n' >four.xyz
 run 1 "four.xyz: 4 points; a convex surface needs 6 at least" convex four.xyz -o x.step
 rm -f two.txt one.txt star.txt line.xyz same.xyz four.xyz
+
+# The words are those of the command line: what the library calls opt.x is --x, and files are named once.
+run 1 "batten: points.none.xyz: cannot open" convex points.none.xyz
+run 1 "batten: --domain: of parameters in the file" convex points.xyz --domain 0,1,0,1
+run 1 "batten: --domain: 1 to 0; give two ascending numbers, or leave it away" convex points.xyz --function --domain 1,0,0,1
+run 1 "is outside the domain 0 .. 0.5; remove it, or widen --domain" convex points.xyz --function --domain 0,0.5,0,1
+run 1 "batten: --rounds: 50; give 1 to 20" convex points.xyz --function --rounds 50
+run 1 "batten: --spans: 20; must be 1 .. 16" convex points.xyz --spans 20
+run 1 "batten: --smoothness: 3; degree 3 allows 1 to 2" convex points.xyz --function --smoothness 3
+run 1 "or --tension > 0" convex points.xyz --degree 7 --tension 0
+run 1 "--memory allows 1048576" convex points.xyz --memory 1M
+run 2 "--size: '300.5,200' is not two whole numbers" convex points.xyz --size 300.5,200
+run 1 "batten: --size: 16 x 16 leave 8 x 8 pixels to a panel" convex points.xyz --picture x.png --size 16,16
+cut -d' ' -f1,2 points.xyz >two.xyz
+run 1 "batten: two.xyz: the points have x and y only, a column z is missing" convex two.xyz
+awk 'BEGIN { print "x,y,z,w" } { print $1 "," $2 "," $3 "," (NR == 4 ? -1 : 1) }' points.xyz >negative.csv
+run 1 "batten: negative.csv: weights[3]: -1" convex negative.csv
+run 1 "batten: negative.csv: weights[3]: -1" convex negative.csv --function
+awk 'BEGIN { print "x,y,z,u,v" } { print $1 "," $2 "," $3 ",1," $2 }' points.xyz >row.csv
+run 1 "batten: row.csv: parameters: all 60 have u = 1; spread them, or take --parameters project" convex row.csv
+printf '%s\n' OFF '6 8 0' '1 0 0' '0 1 0' '-1 0 0' '0 -1 0' '0 0 1' '0 0 -1' \
+  '3 0 1 4' '3 1 2 4' '3 2 3 4' '3 3 0 4' '3 1 0 5' '3 2 1 5' '3 3 2 5' '3 0 3 5' >closed.off
+run 1 "batten: closed.off: triangles: they close to a surface without a boundary" convex closed.off --parameters floater
+printf '+\xe2\x88\x92\n++\n' >minus.txt
+run 1 "minus.txt:1: '$(printf '\xe2\x88\x92')' is no sign" convex points.xyz --function --spans 2 --signs minus.txt
+rm -f two.xyz negative.csv row.csv closed.off minus.txt
 nothing_new "after all failures"
 
 # ---- shapes that are not convex -----------------------------------------------------------------

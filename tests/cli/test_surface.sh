@@ -42,8 +42,11 @@ is r.json certified False
 holds r.json K_min '(x + 0.5)^2 < 1e-18'
 check "a saddle is told to be none" grep -q '^convexity .*not proven' out
 
-# Every key that is reported is described.
-sed -n '/^## batten inspect/,/^## batten network/p' "$root/docs/report.md" | sed -n '/^- surface/,/^- solid/p' >described
+# Every key that is reported is described, here or in the table of `batten convex`, to which this points.
+{
+  sed -n '/^## batten inspect/,/^## batten convex/p' "$root/docs/report.md" | sed -n '/^- surface/,/^- solid/p'
+  sed -n '/^## batten convex/,/^## batten network/p' "$root/docs/report.md" | sed -n '/`certified`/,/`box_x_min`/p'
+} >described
 undescribed=
 for key in $(python3 -c 'import json; print("\n".join(json.load(open("r.json"))))' | sed -n '/^kind$/,$p'); do
   case $key in kind | box_* | centroid_*) continue ;; esac

@@ -39,32 +39,32 @@ static void options(batten_context *ctx) {
     T_STATUS(try(ctx, N, points, &o), BATTEN_E_INVALID, ctx, part); \
   } while (0)
   REFUSED(o.struct_size = 1, "struct_size: 1");
-  REFUSED(o.degree[1] = 1, "degree[1]: 1; give 2 to 7");
-  REFUSED(o.degree[0] = 8, "degree[0]: 8");
-  REFUSED(o.spans[0] = 0, "spans[0]: 0; give 1 to 64");
-  REFUSED(o.spans[1] = 65, "spans[1]: 65");
-  REFUSED(o.smoothness[0] = 3, "smoothness[0]: 3; degree 3 allows 1 to 2");
-  REFUSED(o.tension = -1, "tension: -1");
-  REFUSED(o.tension = NAN, "tension: nan");
-  REFUSED(o.gap_tol = 0, "gap_tol: 0");
-  REFUSED(o.rounds = 0, "rounds: 0; give 1 to 20");
-  REFUSED(o.rounds = 21, "rounds: 21");
+  REFUSED(o.degree[1] = 1, "opt.degree[1]: 1; give 2 to 7");
+  REFUSED(o.degree[0] = 8, "opt.degree[0]: 8");
+  REFUSED(o.spans[0] = 0, "opt.spans[0]: 0; give 1 to 64");
+  REFUSED(o.spans[1] = 65, "opt.spans[1]: 65");
+  REFUSED(o.smoothness[0] = 3, "opt.smoothness[0]: 3; degree 3 allows 1 to 2");
+  REFUSED(o.tension = -1, "opt.tension: -1");
+  REFUSED(o.tension = NAN, "opt.tension: nan");
+  REFUSED(o.gap_tol = 0, "opt.gap_tol: 0");
+  REFUSED(o.rounds = 0, "opt.rounds: 0; give 1 to 20");
+  REFUSED(o.rounds = 21, "opt.rounds: 21");
   REFUSED((o.domain[0][0] = 0, o.domain[0][1] = 1, o.domain[1][0] = 0, o.domain[1][1] = 0.5), "is outside the domain");
-  REFUSED(o.domain[0][0] = 0, "domain[0]: 0 to nan");
-  REFUSED((o.domain[0][0] = 2, o.domain[0][1] = 1, o.domain[1][0] = 0, o.domain[1][1] = 1), "domain[0]: 2 to 1");
-  REFUSED(o.break_count[0] = 2, "breaks[0]: NULL; give [2]");
-  REFUSED((o.break_count[0] = 2, o.breaks[0] = two), "breaks[0][1]: 0.40000000000000002; breaks must ascend");
-  REFUSED((o.break_count[1] = 1, o.breaks[1] = outside), "breaks[1][0]: 2; give one inside the domain");
-  REFUSED((o.break_count[1] = 64, o.breaks[1] = outside), "break_count[1]: 64; give at most 63");
+  REFUSED(o.domain[0][0] = 0, "opt.domain[0]: 0 to nan");
+  REFUSED((o.domain[0][0] = 2, o.domain[0][1] = 1, o.domain[1][0] = 0, o.domain[1][1] = 1), "opt.domain[0]: 2 to 1");
+  REFUSED(o.break_count[0] = 2, "opt.breaks[0]: NULL; give [2]");
+  REFUSED((o.break_count[0] = 2, o.breaks[0] = two), "opt.breaks[0][1]: 0.40000000000000002; breaks must ascend");
+  REFUSED((o.break_count[1] = 1, o.breaks[1] = outside), "opt.breaks[1][0]: 2; give one inside the domain");
+  REFUSED((o.break_count[1] = 64, o.breaks[1] = outside), "opt.break_count[1]: 64; give at most 63");
   memset(signs, 1, sizeof signs);
   signs[7] = 2;
-  REFUSED(o.signs = signs, "signs[1][3]: 2; give -1, 0 or 1");
+  REFUSED(o.signs = signs, "opt.signs[1][3]: 2; give -1, 0 or 1");
   for (int k = 0; k < N; k++) weights[k] = 0;
-  REFUSED(o.weights = weights, "weights: all are 0");
+  REFUSED(o.weights = weights, "opt.weights: all are 0");
   weights[3] = -1;
-  REFUSED(o.weights = weights, "weights[3]: -1");
+  REFUSED(o.weights = weights, "opt.weights[3]: -1");
   weights[3] = NAN;
-  REFUSED(o.weights = weights, "weights[3]: nan");
+  REFUSED(o.weights = weights, "opt.weights[3]: nan");
 }
 
 static void points_refused(batten_context *ctx) {
@@ -100,7 +100,7 @@ static void stopped(batten_context *ctx) {
   o.rounds = 1;
   o.gap_tol = 1e-9;
   o.signs = signs;
-  T_STATUS(try(ctx, N, points, &o), BATTEN_W_STOPPED, ctx, "use more rounds");
+  T_STATUS(try(ctx, N, points, &o), BATTEN_W_STOPPED, ctx, "raise opt.rounds");
 }
 
 static batten_status small(batten_context *ctx, void *arg) {
