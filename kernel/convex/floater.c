@@ -214,14 +214,20 @@ static batten_status find_inner(batten_context *ctx, const convex_disc *disc, co
   return st;
 }
 
-/* W_ACCURACY when a triangle is not positive in the square. count: points but those of splits. */
+/* W_ACCURACY when a triangle is not positive in the square. count: points but those of splits, which are nobody's:
+ * where these have only points of the rim around them, nothing is lost when they fall together. */
 static batten_status check_folds(batten_context *ctx, const convex_disc *disc, size_t count, const double *uv) {
   size_t folds = 0;
   uint32_t near = 0;
   for (size_t t = disc->triangles; t-- > 0;) {
     const uint32_t *c = disc->corners + 3 * t;
     const double *p = uv + 2 * (size_t)c[0], *q = uv + 2 * (size_t)c[1], *r = uv + 2 * (size_t)c[2];
-    if (batten_orient2d(p, q, r, 0, 1) > 0) continue;
+    bool has_split = false, has_inner = false;
+    for (int k = 0; k < 3; k++) {
+      has_split = has_split || c[k] >= count;
+      has_inner = has_inner || (c[k] < count && !convex_disc_is_rim(disc, c[k]));
+    }
+    if ((has_split && !has_inner) || batten_orient2d(p, q, r, 0, 1) > 0) continue;
     folds++;
     for (int k = 0; k < 3; k++)
       if (c[k] < count) near = c[k];

@@ -223,10 +223,11 @@ void convex_outline_map(const convex_disc *disc, const double *xyz, size_t count
   memset(side, 0, disc->points);
   for (size_t k = 0; k < count; k++) {
     size_t first = corners[k], last = corners[(k + 1) % count] + (corners[(k + 1) % count] > first ? 0 : r.count);
-    double length = 0, passed = 0;
-    for (size_t i = first; i < last; i++) length += vec_distance(rim_point(&r, i), rim_point(&r, i + 1));
-    double least = length > 0 ? DBL_EPSILON * length : 1; /* points at one place stay apart */
-    length += least * (double)(last - first);
+    double chords = 0, length = 0, passed = 0;
+    for (size_t i = first; i < last; i++) chords += vec_distance(rim_point(&r, i), rim_point(&r, i + 1));
+    double least = chords > 0 ? 2 * DBL_EPSILON * chords : 1; /* points at one place stay apart */
+    /* Added up as below, to the bit: no point comes after the corner. */
+    for (size_t i = first; i < last; i++) length += vec_distance(rim_point(&r, i), rim_point(&r, i + 1)) + least;
     const double *from = ends[k], *to = ends[(k + 1) % count];
     for (size_t i = first; i <= last; i++) {
       size_t point = disc->rim[i % r.count];

@@ -383,6 +383,39 @@ static void test_flat_edges(batten_context *ctx) {
   drop(&s);
 }
 
+/* Points of the rim by the thousand, heaps of them at the corners: in the square, and apart. A fan of as many without
+ * points inside has no fault either. */
+static void test_long_rim(batten_context *ctx) {
+  enum { N = 20000, FAN = 3000, HEAP = 50 };
+  scene s = cap(1, N, 1);
+  double *uv = malloc(2 * s.count * sizeof *uv);
+  uint64_t seed = 23;
+  uint32_t corners[4] = {1, 1 + N / 4, 1 + N / 2, 1 + 3 * N / 4};
+  for (size_t i = 1; i <= N; i++) s.points[3 * i] *= 1 + 1e-3 * t_uniform(&seed);
+  for (size_t k = 0; k < 4; k++)
+    for (size_t i = 1; i < HEAP; i++)
+      memcpy(s.points + 3 * ((corners[k] + N - 1 - i) % N + 1), s.points + 3 * corners[k], 3 * sizeof *s.points);
+  batten_parametrize_options o = batten_parametrize_options_default();
+  o.method = BATTEN_PARAMETERS_FLOATER;
+  o.triangle_count = s.triangle_count;
+  o.triangles = s.triangles;
+  o.corners = corners;
+  T_OK(batten_parametrize(ctx, s.count, s.points, &o, uv), ctx);
+  T_CHECK(is_in_square(s.count, uv) && count_folds(&s, uv) == 0, "%d points on the rim, %d at each corner's place", N,
+          HEAP);
+  drop(&s);
+  s = new_scene(FAN, FAN - 2);
+  for (uint32_t i = 0; i < FAN; i++) {
+    s.points[3 * i] = cos(2 * PI * i / FAN);
+    s.points[3 * i + 1] = sin(2 * PI * i / FAN);
+    for (uint32_t k = 0; k < 3 && i < FAN - 2; k++) s.triangles[3 * i + k] = k ? i + k : 0;
+  }
+  T_OK(parametrize(ctx, &s, BATTEN_PARAMETERS_FLOATER, uv), ctx);
+  T_CHECK(is_in_square(s.count, uv), "a fan of %d points: in the square", FAN);
+  drop(&s);
+  free(uv);
+}
+
 /* The hull of an L is not its outline: but for what four steps hide, its reentrant sides are on the boundary all the
  * same. 80 points are, 61 of the hull and what fills it. */
 static void test_gap(batten_context *ctx) {
@@ -537,6 +570,7 @@ int main(void) {
   test_floater_invariance(ctx);
   test_corners(ctx);
   test_flat_edges(ctx);
+  test_long_rim(ctx);
   test_gap(ctx);
   test_bad_points(ctx);
   test_no_disc(ctx);
