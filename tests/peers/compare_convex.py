@@ -115,8 +115,8 @@ def check(ok, text):
     print(f"{'ok' if ok else 'not ok'} {count} - {text}", flush=True)
 
 
-def fit(degrees, spans, points):
-    numbers = [*degrees, *spans, GAP, 12, len(points), *points.ravel()]
+def fit(degrees, spans, rounds, points):
+    numbers = [*degrees, *spans, GAP, rounds, len(points), *points.ravel()]
     run = subprocess.run([sys.argv[1]], input=" ".join(repr(getattr(x, "item", lambda x=x: x)()) for x in numbers),
                          capture_output=True, text=True)
     if run.returncode:
@@ -130,7 +130,8 @@ def compare(number, name, degrees, spans, size, noise):
     points = random.uniform(-1, 1, (size, 3))
     points[:, 2] = FUNCTIONS[name](points[:, 0], points[:, 1]) + noise * random.standard_normal(size)
     label = f"{name}, degrees {degrees}, {spans} spans, {size} points: "
-    answer = fit(degrees, spans, points)
+    small = (degrees[0] + spans[0]) * (degrees[1] + spans[1]) <= 30
+    answer = fit(degrees, spans, 12 if small else 2, points)
     if answer is None:
         return check(False, label + "no answer")
     (status, objective, lower, lsq, lsq_lower, certified), free, convex = answer
@@ -146,13 +147,13 @@ def compare(number, name, degrees, spans, size, noise):
         return np.sum((a @ x - points[:, 2]) ** 2)
     off = max(abs(squares(convex) / lsq - 1), abs(objective / lsq * size - 1))
     check(off <= 1e-10 and certified, label + f"certified, sum of squares off by {off:.1e}")
-    if len(free) > 30:
+    if not small:
         return None
-    x = least_squares(a, points[:, 2], rows_below(t, degrees, 25, 40))
+    x = least_squares(a, points[:, 2], rows_below(t, degrees, 25, 48))
     below = squares(x)
     check(lsq >= below * (1 - 1e-9), label + f"{lsq:.8g} is not below {below:.8g} of necessary rows")
     best = np.inf
-    for parts, fan in [(1, 4), (1, 12), (3, 12), (3, 24)]:
+    for parts, fan in [(1, 4), (1, 16), (3, 16), (4, 32)]:
         rows = rows_above(t, degrees, spans, parts, fan)
         x = least_squares(a, points[:, 2], rows)
         violated = -(rows @ x).min() / np.abs(rows).max()
