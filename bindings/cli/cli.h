@@ -172,7 +172,7 @@ enum {
 #define CLI_OPTION_SIZE \
   { "size", CLI_KEY_SIZE, "W,H", "picture's size in pixels; default 1200,900" }
 #define CLI_OPTION_TITLE \
-  { "title", CLI_KEY_TITLE, "TEXT", "title in the picture" }
+  { "title", CLI_KEY_TITLE, "TEXT", "title in the picture, ASCII" }
 #define CLI_OPTION_HELP \
   { "help", 'h', NULL, "this text" }
 

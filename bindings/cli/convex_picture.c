@@ -200,6 +200,15 @@ static const double flat_gauss = 1e-9;
 /* A part of the range of K is left out where the rest would be pressed flat by it, into a third of the height. */
 static const double worth_cutting = 3;
 
+/* Curvatures that are rounding beside the largest are 0: else their signs were drawn. */
+static void round_gauss(convex_grid *g) {
+  double largest = 0;
+  for (size_t i = 0; i < PLACES; i++)
+    if (isfinite(g->points[i].gauss)) largest = fmax(largest, fabs(g->points[i].gauss));
+  for (size_t i = 0; i < PLACES; i++)
+    if (fabs(g->points[i].gauss) < 1e-12 * largest) g->points[i].gauss = 0;
+}
+
 /* The plot's range: that of all K, or, where there are spikes, so far beyond where 96 % of them are as these spread
  * themselves. */
 static batten_status choose_range(batten_context *ctx, drawing *d) {
@@ -246,6 +255,7 @@ static batten_status make_plot(batten_context *ctx, drawing *d) {
   d->tones = batten_alloc_array(ctx, PLACES, sizeof *d->tones);
   batten_status st = BATTEN_E_NOMEM;
   if (!vertices || !values || !missing || !d->tones) goto done;
+  round_gauss(&d->grid);
   st = choose_range(ctx, d);
   if (st < 0) goto done;
   for (size_t i = 0; i < PLACES; i++) {

@@ -8,14 +8,21 @@ double picture_title_room(const batten_picture_options *o, double unit) {
   return (o->title ? 3.4 * unit : 0) + (o->caption ? 1.9 * unit : 0);
 }
 
+/* A long line is written smaller, so that its end is in the picture. */
+static void title_line(picture_image *im, double left, double base, double height, double weight, const char *text) {
+  double room = (double)im->width - 1.5 * left, width = picture_text_width(height, text);
+  if (width > room && room > 0) height *= room / width;
+  picture_mask_text(im, left, base, height, weight, text);
+}
+
 void picture_draw_title(picture_image *im, const batten_picture_options *o, double unit, double left) {
   double base = o->title ? 3.2 * unit : 1.2 * unit;
   if (o->title) {
-    picture_mask_text(im, left, base, 1.25 * unit, 1.15, o->title);
+    title_line(im, left, base, 1.25 * unit, 1.15, o->title);
     picture_blend(im, picture_srgb(0x2a2d33), 0.95);
   }
   if (o->caption) {
-    picture_mask_text(im, left, base + 1.9 * unit, 0.9 * unit, 1, o->caption);
+    title_line(im, left, base + 1.9 * unit, 0.9 * unit, 1, o->caption);
     picture_blend(im, picture_srgb(0x3a3e46), 0.9);
   }
 }

@@ -309,6 +309,23 @@ static void test_bad_lines(batten_context *ctx, const batten_mesh *ball) {
   T_STATUS(batten_picture_mesh(ctx, ball, &o, path_a), BATTEN_E_INVALID, ctx, "opt.axes->from[2], to: 0, nan");
 }
 
+/* Titles and captions that are too long for their panel are smaller, not cut off: the last letter is seen. */
+static void test_long_titles(batten_context *ctx, const batten_mesh *ball) {
+  static const char *const texts[] = {"mmmmmmmmmm", "mmmmmmmmmm mmmmmmmmmm mmmmmmmmmm mmmmmmmmmm mmmmmmmmmm mmmm m"};
+  for (int i = 0; i < 2; i++) {
+    batten_picture_options o = batten_picture_options_default();
+    o.width = WIDTH, o.height = HEIGHT, o.title = texts[i], o.caption = texts[i];
+    batten_picture_panel panels[2] = {{ball, &o, 0}, {NULL, NULL, 0}};
+    T_STATUS(batten_picture_panels(ctx, 1, 2, panels, &o, path_a), BATTEN_OK, ctx, "");
+    pixels p = read_png(path_a);
+    spot above = find(&p, is_dark, 0, 0, WIDTH, HEIGHT / 4), beside = find(&p, is_dark, CELL_X, 40, WIDTH, HEIGHT);
+    T_CHECK(above.count > 50 && above.x1 < WIDTH - 4, "title %d: %zu dark pixels, up to column %zu", i, above.count,
+            above.x1);
+    T_CHECK(beside.count == 0, "title %d: %zu dark pixels in the other panel", i, beside.count);
+    free(p.rgb);
+  }
+}
+
 int main(void) {
   if (!mkdtemp(directory)) return 1;
   snprintf(path_a, sizeof path_a, "%s/a.png", directory);
@@ -319,6 +336,7 @@ int main(void) {
   test_lines(ctx, ball);
   test_axes(ctx);
   test_sides(ctx);
+  test_long_titles(ctx, ball);
   test_dots(ctx, ball);
   test_bad(ctx, ball);
   test_bad_lines(ctx, ball);
