@@ -51,10 +51,10 @@ BATTEN_API batten_parametrize_options batten_parametrize_options_default(void);
  * about theirs); u is the side that points most along the coordinate axis which follows that largest one (x after z).
  * FLOATER folds no triangle, where edges through the inside with both ends on one side of the square count as bent in
  * their middle (straight they would lie on that side, and an ear there has no area); it reproduces points of a plane
- * in a rectangle but for its scale; points in a plane within another outline are bent to the square. Cost: O(n log n); FLOATER solves a sparse system of n unknowns
- * directly, O(n^1.5). BATTEN_W_ACCURACY: done, but triangles vanish to the rounding of parameters (a nearly closed
- * surface); the text says where. Progress phase "parameters". Fails: INVALID (points on a line; triangles that are no
- * disc, named), NOMEM, TOO_LARGE, CANCELLED. */
+ * in a rectangle but for its scale; points in a plane within another outline are bent to the square. Cost:
+ * O(n log n); FLOATER solves a sparse system of n unknowns directly, O(n^1.5). BATTEN_W_ACCURACY: done, but triangles
+ * vanish to the rounding of parameters (a nearly closed surface); the text says where. Progress phase "parameters".
+ * Fails: INVALID (points on a line; triangles that are no disc, named), NOMEM, TOO_LARGE, CANCELLED. */
 BATTEN_API batten_status batten_parametrize(batten_context *ctx, size_t count, const double *points,
                                             const batten_parametrize_options *opt, double *parameters);
 
