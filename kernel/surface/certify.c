@@ -7,6 +7,7 @@
  * 8n-4). Points are multiplied by a power of two, and so are the parameters: that changes no digit. */
 #include "certify.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -370,7 +371,7 @@ static void report(certifier *c, const verdict *v, batten_convexity *out) {
                         .unproven = p->unproven,
                         .worst_at = {p->least_at[0], p->least_at[1]}};
   if (v->certified)
-    r.margin_min = isfinite(least) ? fmax(0, fmin(CERTIFY_SHARE * least, p->bound)) * unit * unit : 0;
+    r.margin_min = isfinite(least) ? fmin(fmax(0, fmin(CERTIFY_SHARE * least, p->bound)) * unit * unit, DBL_MAX) : 0;
   else
     r.margin_min = fmin(least, 0) * unit * unit;
   if (v->certified) r.sign = c->opt->signs ? common_sign(c) : v->sign == 2 ? 0 : v->sign;

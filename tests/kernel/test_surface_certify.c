@@ -225,6 +225,16 @@ static void test_spots(batten_context *ctx) {
   }
 }
 
+/* K is within doubles, the square of the unit in which it was proven is not. */
+static void test_tiny(batten_context *ctx) {
+  scene s = graph(3, 3, (const double[MONOMIALS][MONOMIALS]){{0, 0, 0.5e-4}, {0}, {0.5e-4}}), t = s;
+  for (size_t i = 0; i < 16; i++)
+    for (int x = 0; x < 3; x++) t.points[i][x] = ldexp(t.points[i][x], -514);
+  batten_convexity c = prove(ctx, &s, NULL), tiny = prove(ctx, &t, NULL);
+  T_CHECK(tiny.certified && tiny.margin_min == ldexp(c.margin_min, 1028) && tiny.margin_min < INFINITY,
+          "K > %.3g of a surface of size 2^-514", tiny.margin_min);
+}
+
 /* Nearly cylinders: certified as long as that can be told. */
 static void test_nearly_flat(batten_context *ctx) {
   for (int k = 2; k <= 20; k += 3) {
@@ -441,7 +451,7 @@ static void test_invariances(batten_context *ctx) {
     for (size_t i = 0; i < t.count[0] * t.count[1]; i++)
       for (int x = 0; x < 3; x++) t.points[i][x] = ldexp(t.points[i][x], k);
     other = prove(ctx, &t, NULL);
-    double expected = ldexp(c.margin_min, -2 * k);
+    double expected = fmin(ldexp(c.margin_min, -2 * k), DBL_MAX); /* no K is larger than infinity */
     T_CHECK(other.certified && other.margin_min == expected && other.boxes == c.boxes &&
                 memcmp(other.worst_at, c.worst_at, sizeof c.worst_at) == 0,
             "times 2^%d: the same bits", k);
@@ -726,6 +736,7 @@ int main(void) {
   test_by_hand(ctx);
   test_caps(ctx);
   test_spots(ctx);
+  test_tiny(ctx);
   test_nearly_flat(ctx);
   test_not_convex(ctx);
   test_random(ctx);
