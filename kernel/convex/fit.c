@@ -13,6 +13,7 @@
 #include "basis/eigen3.h"
 #include "mesh/vec.h"
 #include "plane.h"
+#include "surface/surface_inner.h"
 
 #include <float.h>
 #include <string.h>
@@ -344,16 +345,15 @@ static void describe(fit *f) {
 
 static batten_status certify(fit *f, const batten_surface *convex, const batten_surface *unconstrained) {
   double start = batten_now();
-  batten_surface_measures m;
+  double range[2][2];
   batten_status st = batten_surface_certify_convex(f->ctx, convex, NULL, &f->info.convexity);
-  if (st >= 0) st = batten_surface_measure(f->ctx, convex, &m);
+  if (st >= 0) st = surface_gauss_range(f->ctx, convex, range[0]);
+  if (st >= 0) st = surface_gauss_range(f->ctx, unconstrained, range[1]);
   if (st < 0) return st;
-  f->info.gauss_min = m.gauss_min;
-  f->info.gauss_max = m.gauss_max;
-  st = batten_surface_measure(f->ctx, unconstrained, &m);
-  if (st < 0) return st;
-  f->info.gauss_min_unconstrained = m.gauss_min;
-  f->info.gauss_max_unconstrained = m.gauss_max;
+  f->info.gauss_min = range[0][0];
+  f->info.gauss_max = range[0][1];
+  f->info.gauss_min_unconstrained = range[1][0];
+  f->info.gauss_max_unconstrained = range[1][1];
   f->info.time_check_s = batten_now() - start;
   return BATTEN_OK;
 }

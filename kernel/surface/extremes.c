@@ -230,3 +230,17 @@ done:
   batten_free(ctx, j.values);
   return st;
 }
+
+batten_status surface_gauss_range(batten_context *ctx, const batten_surface *surface, double range[2]) {
+  surface_axis axis[2] = {{0}};
+  surface_extreme found[SURFACE_EXTREMES];
+  batten_status st = BATTEN_OK;
+  for (int k = 0; k < 2 && st >= 0; k++) st = surface_axis_make(ctx, &surface->space[k], &axis[k]);
+  if (st >= 0) st = surface_find_extremes(ctx, surface, axis, 0, 1, found);
+  for (int k = 0; k < 2; k++) surface_axis_free(ctx, &axis[k]);
+  if (st < 0) return st;
+  double unit = ldexp(1, surface->exponent);
+  range[0] = found[SURFACE_GAUSS_MIN].value * unit * unit;
+  range[1] = found[SURFACE_GAUSS_MAX].value * unit * unit;
+  return BATTEN_OK;
+}

@@ -89,6 +89,9 @@ typedef struct surface_extreme {
 batten_status surface_find_extremes(batten_context *ctx, const batten_surface *surface, const surface_axis axis[2],
                                     double from, double to, surface_extreme out[SURFACE_EXTREMES]);
 
+/* Least and largest Gaussian curvature, caller's unit: those of batten_surface_measure, without the rest of it. */
+batten_status surface_gauss_range(batten_context *ctx, const batten_surface *surface, double range[2]);
+
 /* A box that holds the surface, larger than the least one by 1e-9 of its size at most, where that can be had. Fails:
  * NOMEM. */
 batten_status surface_find_box(batten_context *ctx, const batten_surface *surface, const surface_axis axis[2],
