@@ -44,9 +44,9 @@ typedef struct convex_track {
 typedef struct convex_verdict {
   double misfit; /* as batten_convex_info.misfit */
   bool dent;
-  size_t worst;      /* the point that is deepest in it, */
-  double depth;      /* its distance inside the convex surface, */
-  size_t neighbours; /* points inside, of that part of the data */
+  size_t worst;  /* the point that is deepest in it, */
+  double depth;  /* how far the mean there lies inside the chord, */
+  size_t points; /* of that part of the data */
 } convex_verdict;
 batten_status convex_judge(batten_context *ctx, const convex_space *space, size_t count, const double *points,
                            const double *weights, const convex_track *convex, convex_verdict *out);
