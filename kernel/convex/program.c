@@ -21,7 +21,7 @@ enum { DUAL_UNKNOWNS = 600 };
 
 batten_status convex_program_new(batten_context *ctx, const convex_space *space, convex_program *out) {
   size_t n = convex_points(space), unknowns = 3 * n, size;
-  convex_program p = {NULL};
+  convex_program p = {.point = NULL};
   bool dense = bspline_span_count(&space->axis[0]) * bspline_span_count(&space->axis[1]) == 1;
   p.point = batten_alloc_array(ctx, unknowns, sizeof *p.point);
   bool all = p.point;
@@ -55,7 +55,7 @@ void convex_program_free(batten_context *ctx, convex_program *p) {
   batten_free(ctx, p->starts);
   batten_free(ctx, p->hessian);
   batten_free(ctx, p->point);
-  *p = (convex_program){NULL};
+  *p = (convex_program){.point = NULL};
 }
 
 static batten_matrix dense_hessian(convex_program *p, const convex_objective *o, double w, double scale) {
