@@ -120,7 +120,7 @@ static void run_random(batten_context *ctx, size_t sets, double dent) {
       printf("csv,random,%g,%zu,%d,%d,%zu,%u,%u,%.4g,%s,%.6g,%.6g,%.6g,%.2f,%zu,%zu,%.4f\n", dent, (size_t)seed,
              (int)rule.body, (int)rule.outline, s.count, o.degree[0], o.degree[1], rule.noise, batten_status_name(st),
              f.lsq_unconstrained, f.lsq_reference, f.lsq, f.misfit, (size_t)rows[seed],
-             f.boxes_per_round[f.rounds - 1], times[seed]);
+             f.rounds ? f.boxes_per_round[f.rounds - 1] : 0, times[seed]);
     }
     batten_surface_free(surface);
     convex_scene_free(&s);

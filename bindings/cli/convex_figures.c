@@ -82,7 +82,11 @@ static void print_sums(const convex_work *w) {
     return;
   }
   const batten_convex_info *i = &w->info;
-  cli_line("sums", "unconstrained %.6g, reference %.6g, result %.6g", i->lsq_unconstrained, i->lsq_reference, i->lsq);
+  if (isnan(i->lsq_reference))
+    cli_line("sums", "unconstrained %.6g, result %.6g", i->lsq_unconstrained, i->lsq);
+  else
+    cli_line("sums", "unconstrained %.6g, reference %.6g, result %.6g", i->lsq_unconstrained, i->lsq_reference,
+             i->lsq);
   if (i->rounds)
     cli_line("rounds", "%u, the last with %zu inequalities on %zu boxes", i->rounds, i->rows_per_round[i->rounds - 1],
              i->boxes_per_round[i->rounds - 1]);

@@ -272,7 +272,7 @@ static double unscaled(const fit *f, double sum) { return sum / f->unit / f->uni
 
 static batten_status run_rounds(fit *f) {
   double part = f->opt->blend;
-  unsigned round = 0;
+  unsigned round = 0, divided = 0;
   for (; round < f->opt->rounds; round++) {
     batten_status st = batten_progress(f->ctx, "fit", (double)round / f->opt->rounds / 2);
     if (st >= 0) st = solve_round(f, round, part);
@@ -281,7 +281,7 @@ static batten_status run_rounds(fit *f) {
     if (offer(f, &f->convex, f->trial, f->convex.parameters)) f->info.round_best = round + 1;
     f->info.lsq_per_round[round] = unscaled(f, f->convex.sum);
     if (f->convex.sum < (1 - f->opt->rounds_tol) * before) continue;
-    if (part < f->opt->blend / 9) {
+    if (divided++ == 3) {
       round++;
       break;
     }
@@ -291,19 +291,21 @@ static batten_status run_rounds(fit *f) {
   return BATTEN_OK;
 }
 
-/* The fit without inequalities. */
+/* The fit without inequalities: its own rounds, at last one from where the convex fit led the points. For corrections
+ * may lead them further there, and what is compared is to be inequalities, not luck. */
 static batten_status run_unconstrained(fit *f) {
   const double *at = f->parameters;
-  for (unsigned round = 0; round < f->info.rounds; round++) {
-    batten_status st = batten_progress(f->ctx, "fit", 0.5 + (double)round / f->info.rounds / 2);
+  unsigned rounds = f->info.rounds + 1;
+  for (unsigned round = 0; round < rounds; round++) {
+    batten_status st = batten_progress(f->ctx, "fit", 0.5 + (double)round / rounds / 2);
     if (st < 0) return st;
+    if (round > 0) at = round < f->info.rounds ? f->unconstrained.parameters : f->convex.parameters;
     convex_objective_set(&f->objective, &f->space, at);
     st = convex_objective_solve(f->ctx, &f->objective, &f->space, f->w, f->trial);
     if (st < 0) return st;
     if (round == 0)
       f->info.lsq_unconstrained_first = unscaled(f, convex_objective_sum(&f->objective, &f->space, f->trial));
     offer(f, &f->unconstrained, f->trial, at);
-    at = f->unconstrained.parameters;
   }
   f->info.lsq_unconstrained = unscaled(f, f->unconstrained.sum);
   return BATTEN_OK;
@@ -396,11 +398,10 @@ static batten_status find_reference(fit *f, bool *found) {
   if (st < 0) return st;
   *found = r.found;
   f->bent = r.bent;
-  f->info.tension_weight = r.weight / f->weight_unit;
   f->info.tension_steps = r.steps;
   if (!r.found) return BATTEN_OK;
+  f->info.tension_weight = r.weight / f->weight_unit;
   f->info.lsq_reference = unscaled(f, convex_objective_sum(&f->objective, &f->space, f->reference));
-  memcpy(f->convex.parameters, f->parameters, 2 * f->count * sizeof *f->parameters);
   offer(f, &f->convex, f->reference, f->parameters);
   return BATTEN_OK;
 }
@@ -423,12 +424,12 @@ static bool is_flat(const fit *f) {
 }
 
 static batten_status run(fit *f) {
-  bool found;
-  batten_status st = find_reference(f, &found);
-  if (st < 0) return st;
-  f->info.rounds = 1;
-  found = found && !is_flat(f);
-  if (found) st = run_rounds(f);
+  bool found = false;
+  batten_status st = BATTEN_OK;
+  f->info.lsq_reference = f->info.tension_weight = f->verdict.misfit = NAN;
+  memcpy(f->convex.parameters, f->parameters, 2 * f->count * sizeof *f->parameters);
+  if (!is_flat(f)) st = find_reference(f, &found);
+  if (st >= 0 && found) st = run_rounds(f);
   if (st >= 0) st = run_unconstrained(f);
   if (st >= 0 && found)
     st = convex_judge(f->ctx, &f->space, f->count, f->points, f->weights, &f->convex, &f->verdict);

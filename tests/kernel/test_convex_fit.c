@@ -165,6 +165,12 @@ static void check_shape(batten_context *ctx, const char *what, const convex_rule
     T_CHECK(r.info.convexity.certified, "what is left is convex");
     T_CHECK(index < s.count && s.dent[index], "point %zu, which the text names, is in the dent", index);
   }
+  if (plane && rule->body == CONVEX_PLANE)
+    T_CHECK(r.info.rounds == 0 && isnan(r.info.lsq_reference) && isnan(r.info.tension_weight) && isnan(r.info.misfit),
+            "no reference, no rounds");
+  else
+    T_CHECK(r.info.rounds > 0 && r.info.lsq_unconstrained <= r.info.lsq * 1.0001, "unconstrained %.6g, convex %.6g",
+            r.info.lsq_unconstrained, r.info.lsq);
   release(&r);
   convex_scene_free(&s);
 }

@@ -98,25 +98,27 @@ enum { BATTEN_CONVEX_ROUNDS_MAX = 100 };
 typedef struct batten_convex_info {
   size_t unknowns;                /* three a control point */
   double lsq_unconstrained;       /* weighted sums of squares, caller's unit^2: without inequalities, same rounds of
-                                     parameter correction, least over them */
+                                     parameter correction and one more from the result's
+                                     parameters, least over them */
   double lsq_unconstrained_first; /* the same at the first parameters */
-  double lsq_reference;           /* first reference surface, first parameters */
+  double lsq_reference;           /* first reference surface, first parameters; NaN: none was found */
   double lsq;                     /* of the result */
   double rms, max_error;          /* of the result: distances of points from their places */
   size_t max_error_index;         /* that point */
   double tension_weight;  /* of the first reference: the paper's w, beside the sum. INFINITY: its limit, or, where that
-                             bends both ways too, a plane that is bent a little. */
+                             bends both ways too, a plane that is bent a little. NaN: none was found. */
   unsigned tension_steps; /* doublings and halvings */
-  unsigned rounds;        /* that were run */
+  unsigned rounds;        /* that were run; 0 where no reference was found, or the points are a plane's */
   unsigned round_best;    /* that gave the result, 0 = the reference already */
   size_t rows_per_round[BATTEN_CONVEX_ROUNDS_MAX]; /* inequalities */
   size_t boxes_per_round[BATTEN_CONVEX_ROUNDS_MAX];
   double lsq_per_round[BATTEN_CONVEX_ROUNDS_MAX]; /* after parameter correction; never rises */
   size_t rows_active;                             /* of the last quadratic program */
-  int plane;                   /* non-zero: no convex reference was found, the result is the best plane */
+  int plane;                   /* non-zero: no convex surface near the points was found, the result is the best
+                                  plane; where rounds were run, figures a round are of what they led to */
   double misfit; /* how far the data bend inwards: of three neighbouring parts of them in a row the middle one's mean
                     lies inside the chord of the others by so many standard deviations of noise; the largest there
-                    is. 0 of fewer points than show it. See BATTEN_W_SHAPE */
+                    is. 0 of fewer points than show it; NaN: no rounds. See BATTEN_W_SHAPE */
   double gauss_min, gauss_max; /* of the result */
   double gauss_min_unconstrained, gauss_max_unconstrained;
   batten_convexity convexity; /* of the result */
