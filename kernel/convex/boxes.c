@@ -352,6 +352,7 @@ static batten_status cover(batten_context *ctx, search *s, const convex_box *pai
     if (convex_patch_set(&s->patch[0], s->space, s->reference, &box) && accept(s, &s->patch[0], &box)) {
       list->rows += box.rows;
       *accepted = list->rows <= s->opt->row_limit;
+      if (!*accepted && s->opt->limited) *s->opt->limited = true;
       batten_status status = s->widest ? push(ctx, list, &box) : BATTEN_OK;
       if (status < 0) return status;
       continue;

@@ -40,6 +40,7 @@ typedef struct convex_row_options {
   unsigned directions, depth_max;
   double row_share, margin;
   size_t row_limit;
+  bool *limited; /* NULL, or becomes true where row_limit refuses a reference */
 } convex_row_options;
 
 /* Rows of length 1 over 3 n_0 n_1 unknowns, exact parallels once. What satisfies rows x >= lower is convex. */

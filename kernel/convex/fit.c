@@ -36,7 +36,8 @@ typedef struct fit {
   convex_program program;
   convex_rows rows;
   bool have_rows;
-  bool bent; /* the first reference: only the end tells whether the data have a convex surface */
+  bool limited; /* a reference was refused for its number of inequalities */
+  bool bent;    /* the first reference: only the end tells whether the data have a convex surface */
   convex_verdict verdict;
   convex_track convex, unconstrained;
   batten_convex_info info;
@@ -443,6 +444,11 @@ static batten_status run(fit *f) {
 static batten_status judge(fit *f) {
   const double *at = f->info.convexity.worst_at;
   const convex_verdict *v = &f->verdict;
+  if (f->info.plane && isnan(f->info.lsq_reference) && f->limited)
+    return batten_fail(f->ctx, BATTEN_W_SHAPE,
+                       "opt.row_limit: %zu inequalities are too few for a convex surface of this degree and these "
+                       "spans near the points; the result is their best plane; raise it, or ask for fewer spans",
+                       f->opt->row_limit);
   if (f->info.plane)
     return batten_fail(f->ctx, BATTEN_W_SHAPE,
                        "points: no convex surface near them was found; the result is their best plane, which misses "
@@ -476,7 +482,8 @@ batten_status batten_convex_fit(batten_context *ctx, size_t count, const double 
   if (st >= 0) st = convex_data_check(ctx, count, points, opt);
   if (st < 0) return st;
   fit f = {.ctx = ctx, .opt = opt, .count = count};
-  f.row_options = (convex_row_options){opt->directions, opt->depth_max, opt->row_share, opt->margin, opt->row_limit};
+  f.row_options =
+      (convex_row_options){opt->directions, opt->depth_max, opt->row_share, opt->margin, opt->row_limit, &f.limited};
   st = begin(&f, points);
   if (st >= 0) st = run(&f);
   if (st >= 0) st = make_surface(&f, f.convex.control, &convex);

@@ -237,8 +237,8 @@ batten_status convex_objective_solve(batten_context *ctx, const convex_objective
   if (!factor || !step) goto done;
   if (!factor_scaled(o, w, factor, scale)) {
     st = batten_fail(ctx, BATTEN_E_SINGULAR,
-                     "parameters: these %zu do not determine the %zu control points%s; give more points, a lower "
-                     "degree, fewer spans%s",
+                     "parameters: these %zu do not determine the %zu control points%s; give more points, a "
+                     "domain that they fill (all NaN), a lower degree, fewer spans%s",
                      o->count, n, w > 0 ? ", even with this tension" : "", w > 0 ? "" : ", or opt.tension > 0");
     goto done;
   }
@@ -308,9 +308,11 @@ batten_status convex_objective_limit(batten_context *ctx, const convex_objective
   for (int a = 0; a < LIMIT && regular; a++)
     regular = gram[a * (LIMIT + 1)] * gram[a * (LIMIT + 1)] > 1e-13 * largest;
   if (!regular)
-    return batten_fail(ctx, BATTEN_E_SINGULAR,
-                       "parameters: all lie on one conic a + b u + c u^2 + d v + e v^2 = 0, which leaves the surface "
-                       "undetermined whatever the tension; spread them over the domain");
+    return batten_fail(
+        ctx, BATTEN_E_SINGULAR,
+        "parameters: all%s lie on one conic a + b u + c u^2 + d v + e v^2 = 0, which leaves the surface "
+        "undetermined whatever the tension; add points at other places",
+        o->weights ? " of positive weight" : "");
   for (int k = 0; k < 3; k++) {
     batten_la_trsv(BATTEN_LA_DOUBLE, 'L', 'N', LIMIT, gram, LIMIT, right + k * LIMIT);
     batten_la_trsv(BATTEN_LA_DOUBLE, 'L', 'T', LIMIT, gram, LIMIT, right + k * LIMIT);

@@ -204,6 +204,18 @@ static void check_shapes(batten_context *ctx) {
   check_shape(ctx, "plane", &rule, 3, BATTEN_W_SHAPE, true);
 }
 
+/* Too few inequalities are not the data's fault. */
+static void check_limit(batten_context *ctx) {
+  convex_scene s = convex_scene_paper(3);
+  batten_convex_options o = batten_convex_options_default();
+  o.row_limit = 100;
+  result r = run(ctx, &s, &o);
+  T_CHECK(r.status == BATTEN_W_SHAPE && r.info.plane && strstr(batten_error(ctx), "opt.row_limit: 100"), "limit: %s",
+          batten_error(ctx));
+  release(&r);
+  convex_scene_free(&s);
+}
+
 /* Convex data are no dent: with weights of four decades, where few points make the means; with points beyond the
  * border, and surfaces of too low a degree to follow them there. */
 static void check_no_dent(batten_context *ctx) {
@@ -355,6 +367,7 @@ int main(void) {
   check_scale(ctx);
   check_same(ctx);
   check_shapes(ctx);
+  check_limit(ctx);
   check_no_dent(ctx);
   check_spaces(ctx);
   convex_scene s = convex_scene_paper(2);
