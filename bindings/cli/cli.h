@@ -208,6 +208,9 @@ void cli_report_null(cli_report *r, const char *key);
 /* Lists: one figure for each round, say. */
 void cli_report_numbers(cli_report *r, const char *key, size_t count, const double *values);
 void cli_report_counts(cli_report *r, const char *key, size_t count, const size_t *values);
+/* box_x_min, box_x_max, ... of n coordinates; centroid_x, ... */
+void cli_report_box(cli_report *r, unsigned n, const double *lower, const double *upper);
+void cli_report_centroid(cli_report *r, const double centroid[3]);
 /* batten_version, blas, blas_threads, threads, status, status_text, time_total_s, peak_bytes. */
 void cli_report_common(cli_report *r, const cli_run *run, batten_status status);
 /* To each report among the outputs; false after a line on stderr. */

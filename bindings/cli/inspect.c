@@ -29,14 +29,11 @@ static void print_help(void) {
 /* ---- kinds --------------------------------------------------------------------------------------- */
 
 static void tell_box(cli_report *r, bool print, unsigned n, const double *lower, const double *upper) {
-  static const char *const names[] = {"box_x_min", "box_x_max", "box_y_min", "box_y_max", "box_z_min", "box_z_max"};
-  if (print) printf("%-14s ", "box");
-  for (unsigned k = 0; k < n; k++) {
-    cli_report_number(r, names[2 * k], lower[k]);
-    cli_report_number(r, names[2 * k + 1], upper[k]);
-    if (print) printf("%s%.6g .. %.6g", k ? "  x  " : "", lower[k], upper[k]);
-  }
-  if (print) putchar('\n');
+  cli_report_box(r, n, lower, upper);
+  if (!print) return;
+  printf("%-14s ", "box");
+  for (unsigned k = 0; k < n; k++) printf("%s%.6g .. %.6g", k ? "  x  " : "", lower[k], upper[k]);
+  putchar('\n');
 }
 
 static batten_status tell_points(cli_run *run, const char *path, bool print, cli_report *r) {
@@ -82,7 +79,7 @@ static batten_status tell_mesh(cli_run *run, const char *path, bool print, cli_r
       cli_line("edges", "%.4g .. %.4g, mean %.4g", m.edge_min, m.edge_max, m.edge_mean);
       cli_line("centroid", "%.6g  %.6g  %.6g", m.centroid[0], m.centroid[1], m.centroid[2]);
     }
-    tell_box(r, false, 3, m.lower, m.upper);
+    cli_report_box(r, 3, m.lower, m.upper);
   }
   batten_mesh_free(mesh);
   return st;

@@ -59,6 +59,19 @@ void cli_report_text(cli_report *r, const char *key, const char *value) {
   set(r, key, text);
 }
 
+void cli_report_box(cli_report *r, unsigned n, const double *lower, const double *upper) {
+  static const char *const names[] = {"box_x_min", "box_x_max", "box_y_min", "box_y_max", "box_z_min", "box_z_max"};
+  for (unsigned k = 0; k < n; k++) {
+    cli_report_number(r, names[2 * k], lower[k]);
+    cli_report_number(r, names[2 * k + 1], upper[k]);
+  }
+}
+
+void cli_report_centroid(cli_report *r, const double centroid[3]) {
+  static const char *const names[] = {"centroid_x", "centroid_y", "centroid_z"};
+  for (size_t k = 0; k < 3; k++) cli_report_number(r, names[k], centroid[k]);
+}
+
 static const char *status_word(batten_status status) {
   switch (status) {
     case BATTEN_OK:
@@ -147,8 +160,7 @@ void cli_report_mesh(cli_report *r, const batten_mesh_measures *m, const size_t 
   cli_report_number(r, "mesh_edge_mean", m->edge_mean);
   cli_report_number(r, "volume", m->volume);
   cli_report_number(r, "area", m->area);
-  static const char *const centroid[] = {"centroid_x", "centroid_y", "centroid_z"};
-  for (size_t k = 0; k < 3; k++) cli_report_number(r, centroid[k], m->centroid[k]);
+  cli_report_centroid(r, m->centroid);
   cli_report_number(r, "inertia_xx", m->inertia[0][0]);
   cli_report_number(r, "inertia_yy", m->inertia[1][1]);
   cli_report_number(r, "inertia_zz", m->inertia[2][2]);

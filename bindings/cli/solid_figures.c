@@ -178,7 +178,6 @@ static void report_plane(const solid_work *w, cli_report *r) {
 }
 
 void solid_report(const solid_work *w, cli_report *r) {
-  static const char *const box[] = {"box_x_min", "box_x_max", "box_y_min", "box_y_max", "box_z_min", "box_z_max"};
   double lower[3], upper[3];
   unsigned n = w->cloud.n;
   cli_report_text(r, "command", "solid");
@@ -190,10 +189,8 @@ void solid_report(const solid_work *w, cli_report *r) {
   cli_report_count(r, "duplicates_merged", w->info.duplicates_merged);
   cli_report_bool(r, "normals_read", w->cloud.normals != NULL);
   batten_solid_box(w->solid, lower, upper);
-  for (unsigned k = 0; k < 3; k++) {
-    cli_report_number(r, box[2 * k], k < n ? lower[k] : NAN);
-    cli_report_number(r, box[2 * k + 1], k < n ? upper[k] : NAN);
-  }
+  if (n == 2) lower[2] = upper[2] = NAN;
+  cli_report_box(r, 3, lower, upper);
   report_fit(w, r);
   report_sign(w, r);
   cli_report_count(r, "evaluations", w->surface.evaluations);

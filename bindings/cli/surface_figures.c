@@ -59,14 +59,8 @@ void surface_report_measures(const batten_surface_measures *m, cli_report *r) {
   cli_report_number(r, "regularity_min", m->regularity_min);
   cli_report_number(r, "supporting_gap", m->supporting_gap);
   cli_report_number(r, "area", m->area);
-  cli_report_number(r, "centroid_x", m->centroid[0]);
-  cli_report_number(r, "centroid_y", m->centroid[1]);
-  cli_report_number(r, "centroid_z", m->centroid[2]);
-  static const char *const box[] = {"box_x_min", "box_x_max", "box_y_min", "box_y_max", "box_z_min", "box_z_max"};
-  for (size_t k = 0; k < 3; k++) {
-    cli_report_number(r, box[2 * k], m->lower[k]);
-    cli_report_number(r, box[2 * k + 1], m->upper[k]);
-  }
+  cli_report_centroid(r, m->centroid);
+  cli_report_box(r, 3, m->lower, m->upper);
 }
 
 void surface_print_convexity(const batten_convexity *c) {
