@@ -92,6 +92,14 @@ static void check(batten_context *ctx, uint64_t seed, unsigned degree, size_t sp
   /* nothing to solve where the minimum lies inside */
   T_OK(convex_program_solve(ctx, &p, &o, &space, w, &rows, reference, reference, x, &active, &solved), ctx);
   T_CHECK(active == 0 && memcmp(x, reference, 3 * o.n * sizeof *x) == 0, "a minimum inside stays");
+  /* what has no solution, as rounding may have it, is said and leaves the place alone */
+  double both[2 * UNKNOWNS_MAX] = {0}, lower[2] = {1, 1};
+  both[0] = 1;
+  both[3 * o.n] = -1;
+  const convex_rows none = {.matrix = batten_matrix_dense(2, 3 * o.n, both), .lower = lower};
+  memcpy(y, x, 3 * o.n * sizeof *x);
+  T_OK(convex_program_solve(ctx, &p, &o, &space, w, &none, unbound, reference, x, &active, &solved), ctx);
+  T_CHECK(!solved && memcmp(x, y, 3 * o.n * sizeof *x) == 0, "no solution: said, nothing written");
   convex_rows_free(ctx, &rows);
   convex_program_free(ctx, &p);
   convex_objective_free(ctx, &o);

@@ -131,8 +131,9 @@ typedef struct batten_convex_info {
  * Progress phases: "parameters", "reference", "quadratic program", "fit", "certify", "measure".
  * BATTEN_OK          fitted, and proven strictly convex (info->convexity.certified)
  * BATTEN_W_SHAPE     done, but the data have another shape: no convex surface near them was found (of row_limit
- *                    inequalities, where the text says so), and the result is the best plane (info->plane); or the result is proven convex, but the data bend inwards by 6
- *                    standard deviations of their noise (info->misfit): a dent. The text says where and by how much.
+ *                    inequalities, where the text says so), and the result is the best plane (info->plane); or the
+ *                    result is proven convex, but the data bend inwards by 6 standard deviations of their noise
+ *                    (info->misfit): a dent. The text says where and by how much.
  * BATTEN_W_ACCURACY  not proven; the text says where
  * Without `parameters` a domain that is all NaN is [0, 1]^2. Same bits for any number of threads, and for points
  * scaled by a power of two. Bytes: some 40 n^2, n control points, and the inequalities. Fails: INVALID (points on a
