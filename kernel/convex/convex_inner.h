@@ -15,7 +15,7 @@
  * judge.c                  noise or a dent
  * options.c                of fits: defaults, ranges, data that make no sense
  * fit.c                    batten_convex_fit: scales, rounds, certificate
- * function_rows.c, function.c   batten_convex_function_fit
+ * function*.c              batten_convex_function_fit, see function_inner.h
  *
  * In all of it points are scaled to a box of size about 1 around 0 (by a power of two), the domain is [0, 1]^2, and
  * the unknowns are the control points in the order [n_0][n_1][3] (functions: [n_0][n_1]). */

@@ -7,7 +7,6 @@
 #include <string.h>
 
 #include "base/checked.h"
-#include "basis/shape.h"
 #include "function_inner.h"
 #include "surface/surface_inner.h"
 
@@ -37,9 +36,10 @@ typedef struct function_fit {
   double *scaled, *weights;   /* [count][3], [count] of sum 1 */
   double plane[3];            /* of z sign scale: plane[0] + plane[1] x + plane[2] y, x and y scaled */
   double scale, total_weight; /* of z: power of two */
-  bool flat;                  /* all z are on a plane */
-  double noise;               /* largest |z| before the plane was taken off, scaled */
+  double variation;           /* of z scaled when all are on a plane, else 0 */
+  double noise;               /* size of what rounding is a part of, scaled */
   double *x, *unconstrained;  /* [n] */
+  double *bowl, *tried;       /* [n] */
   double *points_of;          /* [n][3] control points */
 } function_fit;
 
@@ -124,6 +124,12 @@ static batten_status find_domain(function_fit *f) {
     if (!(d[0] < d[1]) || !isfinite(d[1] - d[0]) || !isnormal(d[1] - d[0]))
       return batten_fail(f->ctx, BATTEN_E_INVALID,
                          "opt.domain[%d]: %g to %g; give two ascending numbers, or NaN four times", i, d[0], d[1]);
+    if (d[1] - d[0] < 1e-10 * fmax(fabs(d[0]), fabs(d[1])))
+      return batten_fail(
+          f->ctx, BATTEN_E_INVALID,
+          "opt.domain[%d]: %.17g to %.17g: too far from 0 for its length, few digits of places are left; "
+          "move it towards 0",
+          i, d[0], d[1]);
     for (size_t k = 0; k < f->count; k++) {
       double at = f->points[3 * k + (size_t)i];
       if (at < d[0] || at > d[1])
@@ -194,7 +200,7 @@ static batten_status make_space(function_fit *f) {
   return BATTEN_OK;
 }
 
-/* Signs, turned such that the first is +1; whether opposite ones touch, also at a corner. */
+/* Signs, turned such that the first is +1; whether there are opposite ones. */
 static batten_status make_signs(function_fit *f) {
   size_t rows = f->space.spans[0], columns = f->space.spans[1];
   f->signs = batten_alloc(f->ctx, rows * columns);
@@ -205,13 +211,11 @@ static batten_status make_signs(function_fit *f) {
     if (f->sign == 0) f->sign = f->signs[k];
   }
   if (f->sign == 0) f->sign = 1;
-  for (size_t k = 0; k < rows * columns; k++) f->signs[k] = (signed char)(f->signs[k] * (int)f->sign);
+  for (size_t k = 0; k < rows * columns; k++) {
+    f->signs[k] = (signed char)(f->signs[k] * (int)f->sign);
+    f->space.opposite = f->space.opposite || f->signs[k] < 0;
+  }
   f->space.signs = f->signs;
-  for (size_t i = 0; i < rows; i++)
-    for (size_t j = 0; j < columns; j++)
-      for (size_t k = i; k < rows && k <= i + 1; k++)
-        for (size_t l = j ? j - 1 : 0; l < columns && l <= j + 1; l++)
-          if (f->signs[i * columns + j] * f->signs[k * columns + l] < 0) f->space.opposite = true;
   return BATTEN_OK;
 }
 
@@ -233,11 +237,22 @@ static batten_status best_plane(function_fit *f) {
     return batten_fail(f->ctx, BATTEN_E_SINGULAR,
                        "points: all that count are on a line, so that they do not determine a function; give points "
                        "beside it");
-  double det = values[0] * values[1];
+  for (int i = 0; i < 5; i++) m[i] /= values[0]; /* of tiny weights the determinant would be 0 */
+  double det = values[1] / values[0];
   f->plane[1] = (m[2] * m[3] - m[1] * m[4]) / det;
   f->plane[2] = (m[0] * m[4] - m[1] * m[3]) / det;
   f->plane[0] = mean[2] - f->plane[1] * mean[0] - f->plane[2] * mean[1];
   return BATTEN_OK;
+}
+
+static batten_status check_size(const function_fit *f) {
+  double unit = 1 / f->scale;
+  if (isfinite(f->scale) && isfinite(unit * unit * f->total_weight)) return BATTEN_OK;
+  return batten_fail(
+      f->ctx, BATTEN_E_INVALID,
+      "points, weights: z of %g and weights of %g together; their sums of squares are beyond a double: "
+      "scale them",
+      unit, f->total_weight);
 }
 
 static batten_status scale_points(function_fit *f) {
@@ -259,9 +274,11 @@ static batten_status scale_points(function_fit *f) {
   }
   batten_status st = best_plane(f);
   if (st < 0) return st;
-  double left = 0;
+  double left = 0, low = INFINITY, high = -INFINITY;
   for (size_t k = 0; k < count; k++) {
     double *p = f->scaled + 3 * k;
+    low = fmin(low, p[2]);
+    high = fmax(high, p[2]);
     p[2] -= f->plane[0] + f->plane[1] * p[0] + f->plane[2] * p[1];
     left = fmax(left, fabs(p[2]));
   }
@@ -271,9 +288,13 @@ static batten_status scale_points(function_fit *f) {
   for (size_t k = 0; k < count; k++) f->scaled[3 * k + 2] *= flat ? 0 : unit;
   for (int i = 0; i < 3; i++) f->plane[i] *= unit;
   f->scale *= unit;
-  f->noise = size * unit;
-  f->flat = flat;
-  return BATTEN_OK;
+  /* What is off by rounding: z itself, and the places of control points, by which a slope becomes one of z. */
+  double far = 0;
+  for (int i = 0; i < 2; i++)
+    far = fmax(far, fmax(fabs(f->domain[i][0]), fabs(f->domain[i][1])) / (f->domain[i][1] - f->domain[i][0]));
+  f->noise = size * unit + far * (1 + fabs(f->plane[1]) + fabs(f->plane[2]));
+  f->variation = flat ? high - low : 0;
+  return check_size(f);
 }
 
 /* ---- the result ---------------------------------------------------------------------------------- */
@@ -291,9 +312,9 @@ static double value_at(const function_fit *f, const double *point) {
   return sum;
 }
 
-/* The surface of scaled coefficients; the weighted sum of squares of its distances in z, their largest. */
-static batten_status make_surface(function_fit *f, const double *x, batten_surface **out, double *lsq,
-                                  double *max_error, size_t *max_index) {
+/* The surface of scaled coefficients; its distances in z. */
+static batten_status make_surface(function_fit *f, const double *x, batten_surface **out,
+                                  batten_convex_function_info *info) {
   batten_surface_form form = {.control_points = f->points_of};
   size_t stride = f->caller[1].count;
   double *greville[2] = {f->greville[0], f->greville[1]};
@@ -316,41 +337,32 @@ static batten_status make_surface(function_fit *f, const double *x, batten_surfa
   double sum = 0, worst = -1;
   for (size_t k = 0; k < f->count; k++) {
     double off = fabs(value_at(f, f->points + 3 * k) - f->points[3 * k + 2]);
-    sum += f->weights[k] * f->total_weight * off * off;
+    sum += f->weights[k] * (off * f->scale) * (off * f->scale); /* scaled: small ones have squares, too */
     if (off > worst) {
       worst = off;
-      *max_index = k;
+      info->max_error_index = k;
     }
   }
-  *lsq = sum;
-  *max_error = worst;
+  info->rms = sqrt(sum) / f->scale;
+  info->lsq = info->rms * info->rms * f->total_weight;
+  info->max_error = worst;
   return batten_surface_create(f->ctx, &form, out);
 }
 
-/* Least and largest Gaussian curvature over a grid in every span pair. */
-static void gauss_range(const function_fit *f, const batten_surface *surface, double *least, double *largest) {
-  enum { GRID = 6 };
-  *least = INFINITY;
-  *largest = -INFINITY;
-  for (size_t s = 0; s < f->space.spans[0] * f->space.spans[1]; s++)
-    for (unsigned g = 0; g < (GRID + 1) * (GRID + 1); g++) {
-      size_t span[2] = {s / f->space.spans[1], s % f->space.spans[1]};
-      double part[2] = {(double)(g / (GRID + 1)) / GRID, (double)(g % (GRID + 1)) / GRID}, place[2], jet[6][3];
-      for (int i = 0; i < 2; i++) {
-        const double *knots = f->caller[i].knots + f->space.span[i][span[i]];
-        place[i] = (1 - part[i]) * knots[0] + part[i] * knots[1];
-      }
-      surface_shape shape;
-      surface_jet(surface, place, jet);
-      if (!surface_shape_make((const double(*)[3])jet, &shape)) continue;
-      *least = fmin(*least, shape.gauss);
-      *largest = fmax(*largest, shape.gauss);
-    }
+/* Subtracts one number [every third] from all where that is exact. */
+static void move_to_origin(size_t count, double *at) {
+  double origin = at[0];
+  for (size_t k = 0; k < count; k++) {
+    double moved = at[3 * k] - origin, part = moved - at[3 * k];
+    if ((at[3 * k] - (moved - part)) - (origin + part) != 0) return;
+  }
+  for (size_t k = 0; k < count; k++) at[3 * k] -= origin;
 }
 
-/* The certificate, of the surface with z multiplied by a power of two that makes it about as high as wide: what is
- * proven of that holds of the surface, with another margin. K = D / (1 + g^2)^2, g the slope: with z times q it is
- * q^2 D / (1 + q^2 g^2)^2, so that K is at least min(q, 1 / q)^2 of that. */
+/* The certificate, of the surface moved to the origin, where its digits tell of its shape, and with z multiplied by a
+ * power of two that makes it about as high as wide: what is proven of that holds of the surface, with another margin.
+ * K = D / (1 + g^2)^2, g the slope: with z times q it is q^2 D / (1 + q^2 g^2)^2, so that K is at least min(q, 1 /
+ * q)^2 of that. */
 static batten_status certify(function_fit *f, const batten_surface *surface, const batten_convexity_options *opt,
                              batten_convexity *out) {
   batten_surface_form form = batten_surface_get(surface);
@@ -363,17 +375,17 @@ static batten_status certify(function_fit *f, const batten_surface *surface, con
   }
   double wide = fmax(f->domain[0][1] - f->domain[0][0], f->domain[1][1] - f->domain[1][0]);
   double factor = high > low && isfinite(high - low) ? batten_unit(high - low) / batten_unit(wide) : 1;
-  for (size_t k = 0; k < f->space.n; k++) {
-    memcpy(f->points_of + 3 * k, form.control_points + 3 * k, 2 * sizeof(double));
-    f->points_of[3 * k + 2] = factor * form.control_points[3 * k + 2];
-  }
+  factor = fmin(fmax(factor, 0x1p-1000), 0x1p1000);
+  memcpy(f->points_of, form.control_points, 3 * f->space.n * sizeof(double));
+  for (size_t axis = 0; axis < 3; axis++) move_to_origin(f->space.n, f->points_of + axis);
+  for (size_t k = 0; k < f->space.n; k++) f->points_of[3 * k + 2] *= factor;
   form.control_points = f->points_of;
   o.slack *= factor;
   batten_status st = batten_surface_create(f->ctx, &form, &copy);
   if (st == BATTEN_OK) st = batten_surface_certify_convex(f->ctx, copy, &o, out);
   if (st == BATTEN_OK) {
     double least = fmin(factor, 1 / factor);
-    out->margin_min *= out->certified ? least * least : 1;
+    if (out->certified) out->margin_min = fmin(out->margin_min, DBL_MAX) * least * least;
     if (out->graph) { /* of any function */
       const double up[3] = {0, 0, 1};
       memcpy(out->direction, up, sizeof up);
@@ -391,7 +403,6 @@ static batten_status prove_slack(function_fit *f, const function_rounds_info *ro
   double width = fmin(f->domain[0][1] - f->domain[0][0], f->domain[1][1] - f->domain[1][0]);
   batten_status st = BATTEN_OK;
   o->slack = fmax(-2 * rounds->margin, 1e-7 * rounds->scale) / (f->scale * width * width);
-  o->box_limit = 20000;
   for (int attempt = 0; attempt < 12 && st == BATTEN_OK; attempt++) {
     st = certify(f, surface, o, &info->convexity);
     info->slack = o->slack;
@@ -402,28 +413,38 @@ static batten_status prove_slack(function_fit *f, const function_rounds_info *ro
 }
 
 /* Makes the surface and proves it. Where the margin, which is above the rounding of second derivatives, is not above
- * that of the proof, as for data on a plane: with more margin. */
-static batten_status prove(function_fit *f, const function_rounds_info *rounds, batten_surface **surface,
-                           batten_convex_function_info *info) {
+ * that of the proof, as for data on a plane: with more margin. When none will do the surface is as it was. */
+static batten_status prove(function_fit *f, const function_terms *terms, function_rounds_info *rounds,
+                           batten_surface **surface, batten_convex_function_info *info) {
   batten_convexity_options o = batten_convexity_options_default();
   size_t spans = f->space.spans[0] * f->space.spans[1];
-  double *bowl = f->unconstrained; /* no longer needed */
   signed char *signs = batten_alloc(f->ctx, spans);
   if (!signs) return BATTEN_E_NOMEM;
   for (size_t k = 0; k < spans; k++) signs[k] = (signed char)(f->signs[k] * (int)f->sign);
   o.signs = signs;
-  function_bowl(&f->space, bowl);
+  o.box_limit = 20000 + 64 * spans;
+  function_bowl(&f->space, f->bowl);
   batten_status st = BATTEN_OK;
-  double more = 15 * rounds->least_margin;
-  for (int attempt = 0; attempt < 5 && st == BATTEN_OK; attempt++, more *= 16) {
-    for (size_t k = 0; k < f->space.n && attempt > 0; k++) f->x[k] += more * bowl[k];
-    batten_surface_free(*surface);
-    *surface = NULL;
-    st = make_surface(f, f->x, surface, &info->lsq, &info->max_error, &info->max_error_index);
-    if (st == BATTEN_OK && f->space.opposite) st = prove_slack(f, rounds, *surface, &o, info);
-    if (!f->space.opposite) o.box_limit = 200000;
-    if (st == BATTEN_OK && !f->space.opposite) st = certify(f, *surface, &o, &info->convexity);
-    if (info->convexity.certified || f->space.opposite) break;
+  double more = 0;
+  for (int attempt = 0; attempt < 9 && st == BATTEN_OK; attempt++) {
+    batten_surface *made = NULL;
+    batten_convex_function_info found = *info;
+    for (size_t k = 0; k < f->space.n; k++) f->tried[k] = f->x[k] + more * f->bowl[k];
+    st = make_surface(f, f->tried, &made, &found);
+    if (st == BATTEN_OK && f->space.opposite) st = prove_slack(f, rounds, made, &o, &found);
+    if (st == BATTEN_OK && !f->space.opposite) st = certify(f, made, &o, &found.convexity);
+    bool proven = found.convexity.certified, taken = st == BATTEN_OK && (attempt == 0 || proven);
+    if (taken) {
+      batten_surface *before = *surface;
+      *surface = made;
+      made = before;
+      *info = found;
+      if (attempt > 0)
+        rounds->objective = function_terms_squares(terms, f->tried) + function_terms_tension(terms, f->tried);
+    }
+    batten_surface_free(made);
+    if (proven || f->space.opposite) break;
+    more = attempt == 0 ? rounds->least_margin : 4 * more;
   }
   batten_free(f->ctx, signs);
   return st;
@@ -435,7 +456,6 @@ static void fill_info(const function_fit *f, const function_rounds_info *rounds,
   info->objective = rounds->objective * unit;
   info->objective_lower = fmin(rounds->lower, rounds->objective) * unit;
   info->lsq_lower = fmin(rounds->squares_lower * unit * f->total_weight, info->lsq);
-  info->rms = sqrt(info->lsq / f->total_weight);
   info->rounds = rounds->rounds;
   memcpy(info->rows_per_round, rounds->rows, sizeof rounds->rows);
   info->rows_outer = rounds->cuts;
@@ -445,10 +465,12 @@ static void fill_info(const function_fit *f, const function_rounds_info *rounds,
 
 static batten_status allocate(function_fit *f) {
   size_t n = f->space.n;
-  f->x = batten_alloc_array(f->ctx, 5 * n, sizeof *f->x);
+  f->x = batten_alloc_array(f->ctx, 7 * n, sizeof *f->x);
   if (!f->x) return BATTEN_E_NOMEM;
   f->unconstrained = f->x + n;
-  f->points_of = f->x + 2 * n;
+  f->bowl = f->x + 2 * n;
+  f->tried = f->x + 3 * n;
+  f->points_of = f->x + 4 * n;
   return BATTEN_OK;
 }
 
@@ -465,17 +487,18 @@ static void release(function_fit *f) {
 /* Where the squares, in units of the scaled z, are as good as nothing: a millionth of z is no difference. */
 static const double floor_of_squares = 1e-12;
 
-static batten_status judge(const function_fit *f, const batten_convex_function_info *info, double floor) {
-  double gap = info->objective - info->objective_lower;
+static batten_status judge(const function_fit *f, const function_rounds_info *rounds,
+                           const batten_convex_function_info *info) {
+  double gap = rounds->objective - rounds->lower;
   if (!info->convexity.certified)
     return batten_fail(f->ctx, BATTEN_W_ACCURACY,
                        "convexity is not proven near (%g, %g); use fewer spans, or raise opt.rounds",
                        info->convexity.worst_at[0], info->convexity.worst_at[1]);
-  if (gap > f->opt.gap_tol * info->objective_lower + floor / (f->scale * f->scale))
+  if (gap > f->opt.gap_tol * rounds->lower + floor_of_squares)
     return batten_fail(
         f->ctx, BATTEN_W_STOPPED,
         "the mean square with tension is %.6g, that of the best such function at least %.6g: more than "
-        "opt.gap_tol = %g apart; raise opt.rounds",
+        "opt.gap_tol = %g apart; raise opt.rounds, or use fewer spans",
         info->objective, info->objective_lower, f->opt.gap_tol);
   return BATTEN_OK;
 }
@@ -499,23 +522,28 @@ batten_status batten_convex_function_fit(batten_context *ctx, size_t count, cons
   double fine = 0;
   for (int i = 0; i < 2; i++) fine = fmax(fine, (double)(f.space.spans[i] * f.opt.degree[i]));
   double noise = 256 * DBL_EPSILON * f.noise * fine * fine; /* of second differences of coefficients */
-  /* Of data on a plane nothing is left: a hundred millionth of their size is as good, and easy to prove. */
-  if (f.flat) noise = fmax(noise, 1e-8 * f.noise);
-  function_rounds_options how = {f.opt.rounds, f.opt.gap_tol, floor_of_squares, noise, false};
+  /* Of data on a plane nothing is left: a hundred millionth of their range is as good, and easy to prove. */
+  noise = fmax(noise, 1e-8 * f.variation);
+  /* 0.7: the proof may ask for more margin */
+  function_rounds_options how = {f.opt.rounds, 0.7 * f.opt.gap_tol, floor_of_squares, noise, false};
   st = function_rounds(ctx, &f.space, &terms, &how, f.x, f.unconstrained, &rounds);
   if (st < 0) goto done;
-  double error, gauss;
-  size_t index;
-  st = make_surface(&f, f.unconstrained, &free_surface, &found.lsq_unconstrained, &error, &index);
+  double range[2][2];
+  st = make_surface(&f, f.unconstrained, &free_surface, &found);
   if (st < 0) goto done;
+  found.lsq_unconstrained = found.lsq;
   double begin = batten_now();
-  gauss_range(&f, free_surface, &found.gauss_min_unconstrained, &gauss);
-  st = prove(&f, &rounds, &surface, &found);
+  st = surface_gauss_range(ctx, free_surface, range[0]);
   if (st < 0) goto done;
-  gauss_range(&f, surface, &found.gauss_min, &found.gauss_max);
+  found.gauss_min_unconstrained = range[0][0];
+  st = prove(&f, &terms, &rounds, &surface, &found);
+  if (st == BATTEN_OK) st = surface_gauss_range(ctx, surface, range[1]);
+  if (st < 0) goto done;
+  found.gauss_min = range[1][0];
+  found.gauss_max = range[1][1];
   found.time_check_s = batten_now() - begin;
   fill_info(&f, &rounds, &found);
-  st = judge(&f, &found, how.floor);
+  st = judge(&f, &rounds, &found);
   *out = surface;
   surface = NULL;
   if (unconstrained) {

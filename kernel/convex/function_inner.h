@@ -21,7 +21,7 @@ typedef struct function_space {
   size_t n, spans[2];
   size_t *span[2];          /* [spans[i]] where they are among the knots */
   const signed char *signs; /* [spans[0]][spans[1]] */
-  bool opposite;            /* span pairs of opposite signs touch: the Hessian vanishes there */
+  bool opposite;            /* there are both signs: no one bowl makes all of it strict, and none where they touch */
 } function_space;
 
 /* Compressed rows that grow, between lower and upper [rows]. */
@@ -113,7 +113,6 @@ typedef struct function_rounds_info {
   double margin;       /* proven: the least eigenvalue, negative = slack is needed */
   double scale;        /* of second derivatives */
   double least_margin; /* that was asked for */
-  bool free;           /* the unconstrained spline is the result */
   double time_rows, time_qp;
 } function_rounds_info;
 

@@ -5,11 +5,11 @@
  * From above, in each round, two splines that are convex:
  *   - the minimum with the sufficient inequalities. Their directions are those of the last such minimum, which stays
  *     feasible, so that objectives never rise; boxes with active inequalities are quartered, and coefficients that
- * are nearly singular get more directions. In the limit nothing convex is excluded.
+ *     are nearly singular get more directions. In the limit nothing convex is excluded.
  *   - where all signs are equal: the solution from below, with as much of (x^2 + y^2) / 2 added as its least
- * eigenvalue asks for. That eigenvalue is bounded by subdivision, so this is a proof, too. Equal signs: the Hessian
- * less `margin` times the identity is to be semidefinite, so that convexity is strict. Where opposite signs touch the
- * Hessian vanishes, and nothing strict can be had. */
+ *     eigenvalue asks for. That eigenvalue is bounded by subdivision, so this is a proof, too.
+ * Equal signs: the Hessian less `margin` times the identity is to be semidefinite, so that convexity is strict. With
+ * both signs no bowl serves all, and where they touch the Hessian vanishes: nothing strict is asked for. */
 #include <string.h>
 
 #include "base/checked.h"
@@ -33,6 +33,7 @@ typedef struct rounds_state {
   size_t box_count, box_room;
   double *outer, *inner, *best, *bowl, *work; /* [n] */
   bool have_inner;
+  unsigned stuck; /* programs that were too hard: after two of them the next would be no easier */
   double margin, scale, objective, lower;
 } rounds_state;
 
@@ -60,9 +61,10 @@ static batten_status minimise(rounds_state *s, const function_matrix *rows, bool
   }
   o.x0 = start;
   o.active = active_start;
-  if (s->space->opposite && rows == &s->cuts) { /* nearly parallel cuts where signs meet: thousands of pivots */
+  if (s->space->opposite && rows) { /* nearly parallel rows where signs meet: thousands of pivots, or circles */
     o.engine = BATTEN_QP_INTERIOR;
     o.hand_over = 0;
+    o.iteration_limit = 100;
   }
   batten_qp_solution out = {.x = x, .active = active};
   batten_qp_info info;
@@ -70,10 +72,12 @@ static batten_status minimise(rounds_state *s, const function_matrix *rows, bool
   batten_status st = batten_qp_solve(s->ctx, &p, &o, s->workspace, &out, &info);
   s->info->time_qp += batten_now() - begin;
   *bound = -INFINITY;
+  if (st == BATTEN_W_STOPPED && info.cancelled)
+    return batten_fail(s->ctx, BATTEN_E_CANCELLED, "cancelled by the host during quadratic program");
   *solved = st == BATTEN_OK || st == BATTEN_W_ACCURACY;
+  s->stuck += st == BATTEN_W_STOPPED;
   if (st == BATTEN_OK) *bound = 2 * (info.objective - fabs(info.duality_gap));
-  if (st == BATTEN_W_STOPPED) return BATTEN_E_CANCELLED;
-  if (st == BATTEN_E_LIMIT || st == BATTEN_E_INFEASIBLE) return BATTEN_OK;
+  if (st == BATTEN_E_LIMIT || st == BATTEN_E_INFEASIBLE) return BATTEN_OK; /* spans of very different lengths */
   return st < 0 ? st : BATTEN_OK;
 }
 
@@ -280,6 +284,7 @@ static batten_status bound_squares(rounds_state *s) {
   batten_status st =
       minimise(s, &s->cuts, false, s->outer, s->cuts.rows ? s->cut_active : NULL, s->work, NULL, &bound, &solved);
   s->info->squares_lower = fmax(bound, 0);
+  s->lower = fmax(s->lower, bound); /* tension only adds */
   return st;
 }
 
@@ -323,8 +328,7 @@ static batten_status start(rounds_state *s, double *unconstrained) {
   double least;
   st = function_least(s->ctx, s->space, s->outer, s->margin / 2, LEAST_BOXES, &least);
   if (st < 0 || least < s->margin / 2) return st;
-  s->info->free = true; /* a minimum of all splines */
-  s->info->margin = least;
+  s->info->margin = least; /* a minimum of all splines */
   s->objective = s->lower = objective_of(s, s->outer);
   memcpy(s->best, s->outer, n * sizeof *s->best);
   return BATTEN_OK;
@@ -337,14 +341,14 @@ batten_status function_rounds(batten_context *ctx, const function_space *space, 
   *info = (function_rounds_info){0};
   batten_status st = allocate(&s);
   if (st == BATTEN_OK) st = start(&s, unconstrained);
-  for (unsigned round = 0; st == BATTEN_OK && round < opt->rounds && !info->free; round++) {
+  for (unsigned round = 0; st == BATTEN_OK && round < opt->rounds && !close_enough(&s); round++) {
     st = from_below(&s, round);
     if (st == BATTEN_OK) st = from_above(&s, round);
     if (st < 0) break;
     info->upper[round] = s.objective;
     info->rounds = round + 1;
     st = batten_progress(ctx, "fit", (round + 1.0) / opt->rounds);
-    if (close_enough(&s)) break;
+    if (s.stuck > 1) break;
   }
   if (st == BATTEN_OK) st = bound_squares(&s);
   if (st == BATTEN_OK) {

@@ -278,6 +278,15 @@ static unsigned choose_directions(const function_directions *opt, const double h
   return count;
 }
 
+/* The direction of an angle; along an axis exactly: the rounding of cos(pi / 2) is no inequality, but where the rest
+ * of a row vanishes it would be scaled up to one. */
+static void direction(double angle, double z[2]) {
+  z[0] = cos(angle);
+  z[1] = sin(angle);
+  for (int k = 0; k < 2; k++)
+    if (fabs(z[k]) < 1e-15) z[k] = 0;
+}
+
 /* Ends the row whose `used` entries have been written behind the others: to length 1, nothing when that is 0. */
 static void finish_row(function_matrix *rows, size_t used, double lower, double upper) {
   size_t begin = rows->starts[rows->rows];
@@ -333,7 +342,9 @@ batten_status function_rows_box(batten_context *ctx, const function_space *space
       for (unsigned a = 0; a < count; a++) {
         bool last = a + 1 == count;
         double from = angles[a], to = last ? angles[0] + half_turn : angles[a + 1];
-        double z[2][2] = {{cos(from), sin(from)}, {cos(to), sin(to)}};
+        double z[2][2];
+        direction(from, z[0]);
+        direction(to, z[1]);
         double part[3] = {sign * z[0][0] * z[1][0], sign * (z[0][0] * z[1][1] + z[0][1] * z[1][0]),
                           sign * z[0][1] * z[1][1]};
         append_row(space, t.first, u, v, part, opt->margin * cos(to - from), INFINITY, rows);
@@ -413,8 +424,7 @@ static double least_at(const function_space *space, const uint32_t span[2], cons
   place_hessian(space, &t, x, h);
   for (int k = 0; k < 3; k++) h[k] *= sign;
   function_eigen(h, values, &angle);
-  z[0] = -sin(angle);
-  z[1] = cos(angle);
+  direction(angle + half_turn / 2, z);
   return values[1];
 }
 

@@ -229,12 +229,13 @@ static batten_status solve_part(batten_context *ctx, convex_program *p, const ba
   batten_qp_solution solution = {.x = d, .active = rows->active};
   batten_qp_info info;
   batten_status st = batten_qp_solve(ctx, &problem, &opt, p->workspace, &solution, &info);
-  if (!opt.hand_over && (st == BATTEN_W_ACCURACY || st == BATTEN_E_LIMIT || st == BATTEN_E_INFEASIBLE)) {
+  if (!opt.hand_over && (st == BATTEN_W_ACCURACY || st == BATTEN_E_LIMIT || st == BATTEN_E_INFEASIBLE ||
+                         (st == BATTEN_W_STOPPED && !info.cancelled))) {
     opt.engine = BATTEN_QP_AUTO;
     opt.hand_over = 1;
     st = batten_qp_solve(ctx, &problem, &opt, p->workspace, &solution, &info);
   }
-  if (st == BATTEN_W_STOPPED) /* no limit was set: the host asked for it */
+  if (st == BATTEN_W_STOPPED && info.cancelled)
     return batten_fail(ctx, BATTEN_E_CANCELLED, "cancelled by the host during quadratic program");
   *solved = st == BATTEN_OK || st == BATTEN_W_ACCURACY;
   if (*solved) *active = info.rows_active;

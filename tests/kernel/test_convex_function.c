@@ -15,6 +15,7 @@ static double bowl(double x, double y) { return 2 * x * x + x * y + 1.5 * y * y 
 static double hill(double x, double y) { return exp(x + 0.5 * y) + 0.5 * y * y; }
 static double saddle(double x, double y) { return x * y; }
 static double roof(double x, double y) { return fabs(x) + 0 * y; }
+static double ripple(double x, double y) { return -sin(2 * 3.14159265358979323846 * x) * (1 + 0.2 * y); }
 static double plane(double x, double y) { return 3 - 2 * x + y; }
 static double wave(double x, double y) { return sin(3.14159265358979323846 * x) * (1 + 0.2 * y); }
 
@@ -100,8 +101,8 @@ static void fit(batten_context *ctx, const char *what, height f, double noise, s
   printf("# %s\n", what);
   T_OK(batten_convex_function_fit(ctx, count, points, o, &s, &u, &info), ctx);
   printf("# unknowns %zu, rounds %u, rows %zu, outer %zu; lsq %.9g, lower %.9g, unconstrained %.9g; slack %.3g\n",
-         info.unknowns, info.rounds, info.rounds ? info.rows_per_round[info.rounds - 1] : 0, info.rows_outer, info.lsq,
-         info.lsq_lower, info.lsq_unconstrained, info.slack);
+         info.unknowns, info.rounds, info.rounds ? info.rows_per_round[info.rounds - 1] : 0, info.rows_outer,
+         info.lsq, info.lsq_lower, info.lsq_unconstrained, info.slack);
   T_CHECK(info.convexity.certified, "proven");
   double gap = info.objective - info.objective_lower;
   T_RATIO(gap, o->gap_tol * info.objective_lower + 1e-11, "within the gap of the lower bound");
@@ -160,7 +161,58 @@ static void signs(batten_context *ctx) {
   batten_surface *s = NULL;
   batten_convex_function_info info;
   T_OK(batten_convex_function_fit(ctx, 300, points, &o, &s, NULL, &info), ctx);
-  T_CHECK(info.lsq == info.lsq_unconstrained && info.objective == info.objective_lower, "nothing asked: unconstrained");
+  T_CHECK(info.lsq == info.lsq_unconstrained && info.objective == info.objective_lower,
+          "nothing asked: unconstrained");
+  batten_surface_free(s);
+}
+
+/* Opposite signs at both ends of spans, around one span pair, and apart: what is best is not always flat. */
+static void sign_patterns(batten_context *ctx) {
+  batten_convex_function_options o = options(2, 4);
+  signed char stripes[16], apart[16], checker[16];
+  for (int k = 0; k < 16; k++) {
+    stripes[k] = k / 4 % 2 ? -1 : 1;
+    apart[k] = k / 4 == 0 ? -1 : k / 4 == 3 ? 1 : 0;
+    checker[k] = (k / 4 + k % 4) % 2 ? -1 : 1;
+  }
+  o.signs = stripes;
+  fit(ctx, "biquadratic stripes", ripple, 0.05, 600, &o);
+  o.signs = apart;
+  fit(ctx, "convex and concave, free between", ripple, 0.05, 600, &o);
+  /* With opposite signs on all four sides of span pairs and C1 only the plane is left. */
+  static double points[3 * MOST];
+  scatter(saddle, 600, 0.05, 7, points);
+  o.signs = checker;
+  batten_surface *s = NULL;
+  batten_convex_function_info info;
+  T_OK(batten_convex_function_fit(ctx, 600, points, &o, &s, NULL, &info), ctx);
+  const double *c = batten_surface_get(s).control_points;
+  T_RATIO(fabs(c[2] - c[5] - c[3 * 30 + 2] + c[3 * 31 + 2]), 1e-6, "the plane");
+  T_RATIO(info.objective - info.objective_lower, 1e-6 * info.objective, "and nothing is better");
+  batten_surface_free(s);
+}
+
+/* Far from the origin, where coordinates have few digits left, the fit is the same; and data on a plane stay on it.
+ */
+static void far_away(batten_context *ctx) {
+  enum { N = 300 };
+  double points[3 * N];
+  batten_convex_function_options o = options(3, 4);
+  batten_surface *s = NULL;
+  batten_convex_function_info near, far;
+  scatter(hill, N, 0.1, 1, points);
+  T_OK(batten_convex_function_fit(ctx, N, points, &o, &s, NULL, &near), ctx);
+  batten_surface_free(s);
+  for (int k = 0; k < 3 * N; k++) points[k] += 1e8;
+  for (int k = 0; k < 4; k++) o.domain[k / 2][k % 2] += 1e8;
+  T_OK(batten_convex_function_fit(ctx, N, points, &o, &s, NULL, &far), ctx);
+  T_RATIO(fabs(far.lsq - near.lsq), 2e-3 * near.lsq, "sum of squares 1e8 away");
+  batten_surface_free(s);
+  o = options(3, 4);
+  scatter(plane, N, 0, 1, points);
+  for (int k = 0; k < N; k++) points[3 * k + 2] += 1e6;
+  T_OK(batten_convex_function_fit(ctx, N, points, &o, &s, NULL, &far), ctx);
+  T_RATIO(far.max_error, 1e-10 * 1e6, "error of a plane that is 1e6 high");
   batten_surface_free(s);
 }
 
@@ -331,7 +383,8 @@ static void asymptotics(batten_context *ctx) {
     falls = falls && (k == 0 || info.upper[k] <= info.upper[k - 1]);
   }
   T_CHECK(falls, "objectives never rise");
-  T_CHECK(info.upper[0] > info.lower * 1.001, "at first they are not at the bound: %.3g", info.upper[0] / info.lower - 1);
+  T_CHECK(info.upper[0] > info.lower * 1.001, "at first they are not at the bound: %.3g",
+          info.upper[0] / info.lower - 1);
   T_RATIO(info.objective / info.lower - 1, 3e-4, "in the end they are: gap");
   T_CHECK(info.objective >= info.lower, "above it");
   function_terms_free(ctx, &terms);
@@ -342,6 +395,8 @@ int main(void) {
   exact_quadratic(ctx);
   fits(ctx);
   signs(ctx);
+  sign_patterns(ctx);
+  far_away(ctx);
   one_dimension(ctx);
   unconstrained(ctx);
   invariances(ctx);

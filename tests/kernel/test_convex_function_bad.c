@@ -88,6 +88,15 @@ static void points_refused(batten_context *ctx) {
   o.weights = weights;
   T_STATUS(try(ctx, N, points, &o), BATTEN_E_SINGULAR, ctx, "all that count are on a line");
   T_OK(try(ctx, 3, points, NULL), ctx);
+  for (int k = 0; k < N; k++) weights[k] = k ? 1 : 1e300;
+  T_OK(try(ctx, N, points, &o), ctx);
+  for (int k = 0; k < N; k++) weights[k] = 1e308;
+  T_STATUS(try(ctx, N, points, &o), BATTEN_E_INVALID, ctx, "sums of squares are beyond a double");
+  for (int k = 0; k < N; k++) points[3 * k + 2] *= 1e200;
+  T_STATUS(try(ctx, N, points, NULL), BATTEN_E_INVALID, ctx, "sums of squares are beyond a double");
+  scatter(points);
+  for (int k = 0; k < N; k++) points[3 * k] += 1e15;
+  T_STATUS(try(ctx, N, points, NULL), BATTEN_E_INVALID, ctx, "too far from 0");
 }
 
 /* One round that is told to come very near: done, but not as near. */

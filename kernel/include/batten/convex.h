@@ -183,8 +183,9 @@ typedef struct batten_convex_function_info {
 
 /* Fits a spline function to points [count][3]: x, y, z = f(x, y), with f convex or concave on span pairs as
  * opt->signs has it. The surface is its graph (x, y, f(x, y)), u = x, v = y. unconstrained as above.
- * Where all signs are equal (or 0) f is strictly convex; where +1 and -1 touch its Hessian vanishes, and what is proven
- * is proven with info->slack. Too few points are fine: tension determines the rest.
+ * Where all signs are equal (or 0) f is strictly convex; where +1 and -1 touch its Hessian vanishes, and with both
+ * signs what is proven is proven with info->slack. Too few points are fine: tension determines the rest. The lower
+ * bounds hold up to the tolerance of quadratic programs, 1e-9 or so of them.
  * BATTEN_OK: proven, and the objective is within gap_tol of objective_lower, or within a millionth of the size of z of
  * it, root mean square. W_STOPPED: proven, but the gap is larger (the text says it). W_ACCURACY: not proven. Progress
  * phases "fit", "certify", and those of the quadratic programs.

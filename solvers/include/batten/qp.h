@@ -96,6 +96,7 @@ typedef struct batten_qp_info {
   size_t proximal_steps;     /* rounds of the proximal loop for semidefinite Hessians; 0 = not needed */
   size_t rows_used;          /* one-sided or two-sided constraints, bounds among them, left after presolve */
   size_t rows_active;        /* in the working set at the end */
+  int cancelled;             /* W_STOPPED: non-zero = the host asked for it, 0 = a limit was met */
   size_t not_convex_index;   /* E_NOT_CONVEX: the unknown whose pivot is negative; else n */
   double blend;              /* exact: the fraction by which x was moved, in [0, 1] */
   double time_setup_s;       /* checks, presolve, first factorization */
