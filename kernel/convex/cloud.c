@@ -115,7 +115,7 @@ batten_status convex_cloud_triangulate(batten_context *ctx, size_t count, const 
   uint32_t *triangles = NULL;
   size_t triangle_count = 0;
   double *flat = batten_alloc_array(ctx, count, 2 * sizeof *flat);
-  batten_status st = flat ? convex_plane_project(ctx, count, points, scale, flat, size, axes) : BATTEN_E_NOMEM;
+  batten_status st = flat ? convex_plane_project(ctx, count, points, NULL, scale, flat, size, axes) : BATTEN_E_NOMEM;
   if (st >= 0) st = batten_mesh_delaunay(ctx, count, flat, first, &triangle_count, &triangles);
   if (st >= 0) st = convex_disc_new(ctx, count, first, triangle_count, triangles, disc);
   if (st >= 0) st = peel_rim(ctx, flat, scale->rounding, disc);

@@ -36,6 +36,7 @@ typedef struct fit {
   convex_program program;
   convex_rows rows;
   bool have_rows;
+  bool flat;    /* the points are a plane's */
   bool limited; /* a reference was refused for its number of inequalities */
   bool bent;    /* the first reference: only the end tells whether the data have a convex surface */
   convex_verdict verdict;
@@ -176,9 +177,11 @@ static batten_status begin(fit *f, const double *points) {
 
 /* ---- rounds ------------------------------------------------------------------------------------- */
 
+static double weight_of(const fit *f, size_t i) { return f->weights ? f->weights[i] : 1; }
+
 static double weighted_sum(const fit *f, const double *squares) {
   double sum = 0;
-  for (size_t i = 0; i < f->count; i++) sum += (f->weights ? f->weights[i] : 1) * squares[i];
+  for (size_t i = 0; i < f->count; i++) sum += weight_of(f, i) * squares[i];
   return sum;
 }
 
@@ -339,7 +342,7 @@ static void describe(fit *f) {
   f->info.rms = sqrt(f->convex.sum / f->total) / f->unit;
   double largest = -1;
   for (size_t i = 0; i < f->count; i++)
-    if ((!f->weights || f->weights[i] > 0) && f->convex.squares[i] > largest) {
+    if (weight_of(f, i) > 0 && f->convex.squares[i] > largest) {
       largest = f->convex.squares[i];
       f->info.max_error_index = i;
     }
@@ -366,10 +369,11 @@ static batten_status fit_plane(fit *f) {
   size_t nu = f->space.axis[0].count, nv = f->space.axis[1].count;
   double size[2], axes[2][3], mean[3] = {0, 0, 0}, flat[2] = {0, 0};
   const convex_scale as_they_are = {.scale = 1, .unit = 1, .rounding = DBL_EPSILON};
-  batten_status st = convex_plane_project(f->ctx, f->count, f->points, &as_they_are, f->parameters, size, axes);
+  batten_status st =
+      convex_plane_project(f->ctx, f->count, f->points, f->weights, &as_they_are, f->parameters, size, axes);
   if (st < 0) return st;
   for (size_t i = 0; i < f->count; i++) {
-    double weight = (f->weights ? f->weights[i] : 1) / f->total;
+    double weight = weight_of(f, i) / f->total;
     for (size_t k = 0; k < 3; k++) mean[k] += weight * f->points[3 * i + k];
     for (size_t k = 0; k < 2; k++) {
       flat[k] += weight * f->parameters[2 * i + k];
@@ -407,17 +411,19 @@ static batten_status find_reference(fit *f, bool *found) {
   return BATTEN_OK;
 }
 
-/* Whether the points are a plane's, to rounding of their coordinates. */
+/* Whether the points that count are a plane's, to rounding of their coordinates. */
 static bool is_flat(const fit *f) {
   double mean[3] = {0, 0, 0}, moments[9] = {0}, values[3], axes[9], far = 1, off = 0;
-  for (size_t i = 0; i < 3 * f->count; i++) mean[i % 3] += f->points[i] / (double)f->count;
+  for (size_t i = 0; i < 3 * f->count; i++) mean[i % 3] += weight_of(f, i / 3) * f->points[i] / f->total;
   for (size_t i = 0; i < f->count; i++)
     for (size_t k = 0; k < 9; k++)
-      moments[k] += (f->points[3 * i + k / 3] - mean[k / 3]) * (f->points[3 * i + k % 3] - mean[k % 3]);
+      moments[k] +=
+          weight_of(f, i) * (f->points[3 * i + k / 3] - mean[k / 3]) * (f->points[3 * i + k % 3] - mean[k % 3]);
   batten_eigen_symmetric(3, moments, values, axes);
   for (int k = 0; k < 3; k++) far = fmax(far, fabs(f->middle[k]) * f->unit);
   for (size_t i = 0; i < f->count; i++) {
     double d[3];
+    if (!(weight_of(f, i) > 0)) continue;
     vec_sub(f->points + 3 * i, mean, d);
     off = fmax(off, fabs(vec_dot(d, axes)));
   }
@@ -429,7 +435,8 @@ static batten_status run(fit *f) {
   batten_status st = BATTEN_OK;
   f->info.lsq_reference = f->info.tension_weight = f->verdict.misfit = NAN;
   memcpy(f->convex.parameters, f->parameters, 2 * f->count * sizeof *f->parameters);
-  if (!is_flat(f)) st = find_reference(f, &found);
+  f->flat = is_flat(f);
+  if (!f->flat) st = find_reference(f, &found);
   if (st >= 0 && found) st = run_rounds(f);
   if (st >= 0) st = run_unconstrained(f);
   if (st >= 0 && found)
@@ -444,6 +451,9 @@ static batten_status run(fit *f) {
 static batten_status judge(fit *f) {
   const double *at = f->info.convexity.worst_at;
   const convex_verdict *v = &f->verdict;
+  if (f->flat)
+    return batten_fail(f->ctx, BATTEN_W_SHAPE,
+                       "points: all lie in a plane to rounding, and so does the result: it bends to neither side");
   if (f->info.plane && isnan(f->info.lsq_reference) && f->limited)
     return batten_fail(f->ctx, BATTEN_W_SHAPE,
                        "opt.row_limit: %zu inequalities are too few for a convex surface of this degree and these "

@@ -20,7 +20,7 @@ batten_parametrize_options batten_parametrize_options_default(void) {
 static batten_status project(batten_context *ctx, size_t count, const double *points, const convex_scale *scale,
                              double *uv) {
   double size[2], axes[2][3];
-  batten_status st = convex_plane_project(ctx, count, points, scale, uv, size, axes);
+  batten_status st = convex_plane_project(ctx, count, points, NULL, scale, uv, size, axes);
   if (st < 0) return st;
   for (size_t i = 0; i < count; i++)
     for (size_t k = 0; k < 2; k++) uv[2 * i + k] /= size[k];
@@ -65,7 +65,8 @@ static batten_status choose_method(batten_context *ctx, size_t count, const doub
   double size[2], axes[2][3], plane_normal[3];
   double *flat = batten_alloc_array(ctx, count, 2 * sizeof *flat);
   double *normals = flat ? batten_alloc_array(ctx, count, 3 * sizeof *normals) : NULL;
-  batten_status st = normals ? convex_plane_project(ctx, count, points, scale, flat, size, axes) : BATTEN_E_NOMEM;
+  batten_status st =
+      normals ? convex_plane_project(ctx, count, points, NULL, scale, flat, size, axes) : BATTEN_E_NOMEM;
   if (st >= 0) {
     vec_cross(axes[0], axes[1], plane_normal);
     bool are_points = sum_normals(count, points, scale, o, normals);

@@ -74,20 +74,22 @@ typedef struct frame {
 } frame;
 
 /* Principal axes, the normal's largest coordinate positive. */
-static void find_axes(size_t count, const double *points, const uint32_t *order, frame *f) {
-  double mean[3] = {0}, moment[9] = {0}, values[3], vectors[9];
+static void find_axes(size_t count, const double *points, const double *weights, const uint32_t *order, frame *f) {
+  double mean[3] = {0}, moment[9] = {0}, values[3], vectors[9], total = 0;
   for (size_t i = 0; i < count; i++) {
     double x[3];
     convex_scale_apply(f->scale, points + 3 * (size_t)order[i], x);
-    for (int k = 0; k < 3; k++) mean[k] += x[k];
+    double weight = weights ? weights[order[i]] : 1;
+    total += weight;
+    for (int k = 0; k < 3; k++) mean[k] += weight * x[k];
   }
-  for (int k = 0; k < 3; k++) mean[k] /= (double)count;
+  for (int k = 0; k < 3; k++) mean[k] /= total;
   for (size_t i = 0; i < count; i++) {
     double x[3];
     convex_scale_apply(f->scale, points + 3 * (size_t)order[i], x);
     vec_sub(x, mean, x);
     for (int k = 0; k < 3; k++)
-      for (int j = k; j < 3; j++) moment[3 * k + j] += x[k] * x[j];
+      for (int j = k; j < 3; j++) moment[3 * k + j] += (weights ? weights[order[i]] : 1) * x[k] * x[j];
   }
   batten_eigen_symmetric(3, moment, values, vectors);
   int largest = 0;
@@ -223,8 +225,8 @@ static void turn_to_sides(size_t count, const double *u, double *flat, double *s
     }
 }
 
-batten_status convex_plane_project(batten_context *ctx, size_t count, const double *points, const convex_scale *scale,
-                                   double *flat, double size[2], double axes[2][3]) {
+batten_status convex_plane_project(batten_context *ctx, size_t count, const double *points, const double *weights,
+                                   const convex_scale *scale, double *flat, double size[2], double axes[2][3]) {
   if (count > UINT32_MAX / 2)
     return batten_fail(ctx, BATTEN_E_TOO_LARGE, "count: %zu; at most %u points have parameters", count,
                        UINT32_MAX / 2);
@@ -235,7 +237,7 @@ batten_status convex_plane_project(batten_context *ctx, size_t count, const doub
   batten_status st = hull ? batten_sort_points(ctx, 3, count, points, order) : BATTEN_E_NOMEM;
   if (st < 0) goto done;
 
-  find_axes(count, points, order, &f);
+  find_axes(count, points, weights, order, &f);
   for (size_t i = 0; i < count; i++) {
     double x[3];
     convex_scale_apply(scale, points + 3 * i, x);

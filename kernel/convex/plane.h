@@ -17,9 +17,10 @@ void convex_scale_apply(const convex_scale *s, const double *point, double out[3
 
 /* Coordinates flat [count][2] of points in their scale along the sides of the rectangle, >= 0, lengths true; size [2]
  * of the rectangle, > 0, is the largest of each, and axes [2] are the unit directions of its sides. The rules for
- * which side is which are at batten_parametrize. count >= 3. Fails: INVALID (points on a line), TOO_LARGE, NOMEM. */
-batten_status convex_plane_project(batten_context *ctx, size_t count, const double *points, const convex_scale *scale,
-                                   double *flat, double size[2], double axes[2][3]);
+ * which side is which are at batten_parametrize. weights [count], NULL = ones: what the plane is best for; the
+ * rectangle holds all points. count >= 3. Fails: INVALID (points on a line), TOO_LARGE, NOMEM. */
+batten_status convex_plane_project(batten_context *ctx, size_t count, const double *points, const double *weights,
+                                   const convex_scale *scale, double *flat, double size[2], double axes[2][3]);
 
 /* How well a direction suits as u: its part along the coordinate axis that follows the normal's largest coordinate.
  */

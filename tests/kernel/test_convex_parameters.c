@@ -159,7 +159,7 @@ static void test_least_rectangle(batten_context *ctx) {
     for (int i = 0; i < 3 * N; i++) p[i] = i % 3 == 2 ? 0 : t_uniform(&seed) + (trial % 2) * t_uniform(&seed);
     convex_scale scale;
     T_OK(convex_scale_find(ctx, N, p, &scale), ctx);
-    T_OK(convex_plane_project(ctx, N, p, &scale, flat, size, axes), ctx);
+    T_OK(convex_plane_project(ctx, N, p, NULL, &scale, flat, size, axes), ctx);
     double least = INFINITY;
     for (int step = 0; step < 9000; step++) {
       double c = cos(PI / 18000 * step), d = sin(PI / 18000 * step),
