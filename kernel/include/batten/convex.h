@@ -185,7 +185,8 @@ typedef struct batten_convex_function_info {
  * opt->signs has it. The surface is its graph (x, y, f(x, y)), u = x, v = y. unconstrained as above.
  * Where all signs are equal (or 0) f is strictly convex; where +1 and -1 touch its Hessian vanishes, and with both
  * signs what is proven is proven with info->slack. Too few points are fine: tension determines the rest. The lower
- * bounds hold up to the tolerance of quadratic programs, 1e-9 or so of them.
+ * bounds are dual values of quadratic programs whose residuals are below 1e-9; what these residuals can shift is not
+ * taken off.
  * BATTEN_OK: proven, and the objective is within gap_tol of objective_lower, or within a millionth of the size of z of
  * it, root mean square. W_STOPPED: proven, but the gap is larger (the text says it). W_ACCURACY: not proven. Progress
  * phases "fit", "certify", and those of the quadratic programs.
