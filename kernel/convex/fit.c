@@ -18,6 +18,10 @@
 #include <float.h>
 #include <string.h>
 
+/* Beyond these the points are no convex surface's, whatever their noise. A plane that is bent a little is held to
+ * less, since it is there only for want of a better reference. */
+static const double BENT_EXCESS = 2, EXCESS = 3;
+
 typedef struct fit {
   batten_context *ctx;
   const batten_convex_options *opt;
@@ -36,9 +40,10 @@ typedef struct fit {
   convex_program program;
   convex_rows rows;
   bool have_rows;
-  bool flat;    /* the points are a plane's */
-  bool limited; /* a reference was refused for its number of inequalities */
-  bool bent;    /* the first reference: only the end tells whether the data have a convex surface */
+  bool flat;     /* the points are a plane's */
+  bool limited;  /* a reference was refused for its number of inequalities */
+  bool bent;     /* the first reference: only the end tells whether the data have a convex surface */
+  double excess; /* how many times as far the points are from the surface as noise is, root mean square */
   convex_verdict verdict;
   convex_track convex, unconstrained;
   batten_convex_info info;
@@ -430,6 +435,17 @@ static bool is_flat(const fit *f) {
   return off <= 64 * DBL_EPSILON * far;
 }
 
+/* Noise is what the unconstrained fit tells where there are points enough: each takes a coordinate across the
+ * surface, each control point gives one. What waves in that fit between the points, and what its parameters have over
+ * the convex one's, are factors below 2. */
+static double find_excess(const fit *f) {
+  double points = 0, free = (double)f->objective.n;
+  for (size_t i = 0; i < f->count; i++) points += !f->weights || f->weights[i] > 0;
+  if (points < 1.5 * free) return 0;
+  double noise = fmax(sqrt(f->unconstrained.sum / f->total * points / (points - free)), CONVEX_EVEN);
+  return sqrt(f->convex.sum / f->total) / noise;
+}
+
 static batten_status run(fit *f) {
   bool found = false;
   batten_status st = BATTEN_OK;
@@ -443,7 +459,8 @@ static batten_status run(fit *f) {
     st = convex_judge(f->ctx, &f->space, f->count, f->points, f->weights, &f->convex, &f->verdict);
   if (st < 0) return st;
   f->info.misfit = f->verdict.misfit;
-  f->info.plane = !found || (f->bent && f->verdict.dent);
+  f->excess = found ? find_excess(f) : 0;
+  f->info.plane = !found || (f->bent && (f->verdict.dent || f->excess > BENT_EXCESS));
   return f->info.plane ? fit_plane(f) : BATTEN_OK;
 }
 
@@ -469,6 +486,12 @@ static batten_status judge(fit *f) {
                        "the surface is not proven convex near (%g, %g), where its Gaussian curvature is %g; raise "
                        "opt.margin or opt.tension",
                        at[0], at[1], f->info.convexity.margin_min);
+  if (!v->dent && f->excess > EXCESS)
+    return batten_fail(f->ctx, BATTEN_W_SHAPE,
+                       "points: the convex surface is %.1f times as far from them as their noise explains, "
+                       "points[%zu] the furthest, by %g; split the data into parts that bend one way, take a higher "
+                       "degree, or accept the surface",
+                       f->excess, f->info.max_error_index, f->info.max_error);
   if (!v->dent) return BATTEN_OK;
   const double *place = f->convex.parameters + 2 * v->worst;
   double there[2];

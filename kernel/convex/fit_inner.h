@@ -4,6 +4,9 @@
 
 #include "convex_inner.h"
 
+/* 1e-4 of the points' size: what departs by less is even to the eye and the hand, and no noise is taken for less. */
+static const double CONVEX_EVEN = 1e-4;
+
 /* options.c: every number in its range, or INVALID. */
 batten_status convex_options_check(batten_context *ctx, const batten_convex_options *opt);
 /* options.c: data that no fit makes sense of: INVALID. parameters as the caller gave them, or NULL. */

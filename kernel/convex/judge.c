@@ -21,8 +21,6 @@
 
 /* 6 deviations: noise does that once in a billion triples. */
 static const double MISFIT = 6;
-/* 1e-4 of the points' size: what departs by less is even to the eye and the hand. */
-static const double FLOOR = 1e-4;
 /* Between two and three points of even weight: from three on a square has a mean. */
 static const double FEWEST = 2.5;
 /* How far the middle one of three may lie beside the chord, of its length. */
@@ -205,7 +203,7 @@ batten_status convex_judge(batten_context *ctx, const convex_space *space, size_
   batten_status st = heights && s.squares && s.spread ? BATTEN_OK : BATTEN_E_NOMEM;
   if (st >= 0) {
     measure_heights(&s, points, heights);
-    s.noise = fmax(find_noise(&s), FLOOR);
+    s.noise = fmax(find_noise(&s), CONVEX_EVEN);
     for (unsigned level = 1; level <= LEVELS; level++)
       for (int shift = 0; shift < 4; shift++) scan_level(&s, level, (const int[2]){shift % 2, shift / 2});
     v.misfit = s.misfit;

@@ -133,7 +133,9 @@ typedef struct batten_convex_info {
  * BATTEN_W_SHAPE     done, but the data have another shape: no convex surface near them was found (of row_limit
  *                    inequalities, where the text says so), and the result is the best plane (info->plane); or the
  *                    result is proven convex, but the data bend inwards by 6 standard deviations of their noise
- *                    (info->misfit): a dent. The text says where and by how much.
+ *                    (info->misfit): a dent; or they are three times as far from it as their noise explains, which
+ *                    the unconstrained fit tells of more than 1.5 points a control point. The text says where and by
+ *                    how much.
  * BATTEN_W_ACCURACY  not proven; the text says where
  * Without `parameters` a domain that is all NaN is [0, 1]^2. Same bits for any number of threads, and for points
  * scaled by a power of two. Bytes: some 40 n^2, n control points, and the inequalities. Fails: INVALID (points on a
