@@ -7,6 +7,13 @@
 
 /* ---- report -------------------------------------------------------------------------------------- */
 
+static void report_count(cli_report *r, const char *key, bool has, size_t value) {
+  if (has)
+    cli_report_count(r, key, value);
+  else
+    cli_report_null(r, key);
+}
+
 /* Keys in one order for both kinds; what a kind has not is null. */
 static void report_fit(const convex_work *w, cli_report *r) {
   bool f = w->request->function;
@@ -25,16 +32,16 @@ static void report_fit(const convex_work *w, cli_report *r) {
   cli_report_number(r, "max_error", f ? g->max_error : i->max_error);
   cli_report_count(r, "max_error_index", f ? g->max_error_index : i->max_error_index);
   cli_report_number(r, "tension_weight", f ? NAN : i->tension_weight);
-  cli_report_number(r, "tension_steps", f ? NAN : (double)i->tension_steps);
+  report_count(r, "tension_steps", !f, i->tension_steps);
   unsigned rounds = f ? g->rounds : i->rounds;
   cli_report_count(r, "rounds", rounds);
-  cli_report_number(r, "round_best", f ? NAN : (double)i->round_best);
+  report_count(r, "round_best", !f, i->round_best);
   cli_report_counts(r, "rows_per_round", rounds, f ? g->rows_per_round : i->rows_per_round);
   cli_report_counts(r, "boxes_per_round", f ? 0 : rounds, i->boxes_per_round);
   cli_report_numbers(r, "lsq_per_round", f ? 0 : rounds, i->lsq_per_round);
-  cli_report_number(r, "boxes", f || !rounds ? NAN : (double)i->boxes_per_round[rounds - 1]);
-  cli_report_number(r, "rows_active", f ? NAN : (double)i->rows_active);
-  cli_report_number(r, "rows_outer", f ? (double)g->rows_outer : NAN);
+  report_count(r, "boxes", !f && rounds > 0, rounds ? i->boxes_per_round[rounds - 1] : 0);
+  report_count(r, "rows_active", !f, i->rows_active);
+  report_count(r, "rows_outer", f, g->rows_outer);
   cli_report_number(r, "slack", f ? g->slack : 0);
   cli_report_bool(r, "plane", !f && i->plane);
   cli_report_number(r, "misfit", f ? NAN : i->misfit);
