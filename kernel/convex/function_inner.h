@@ -59,6 +59,11 @@ typedef struct function_box {
   unsigned depth;
   double lower[2], upper[2];
 } function_box;
+/* In a span pair. */
+typedef struct function_place {
+  uint32_t span[2];
+  double at[2];
+} function_place;
 static inline int function_sign(const function_space *space, const uint32_t span[2]) {
   return space->signs[span[0] * space->spans[1] + span[1]];
 }
@@ -86,15 +91,15 @@ batten_status function_rows_box(batten_context *ctx, const function_space *space
  * constant, and its second derivative across vanishes if that is continuous. */
 batten_status function_equalities(batten_context *ctx, const function_space *space, function_matrix *rows);
 
-/* Necessary inequalities where x violates them, appended: in every span pair at the places of a grid and at the worst
- * place near those. *worst: the least eigenvalue that was met, 0 if none is negative. */
+/* Necessary inequalities where x violates them by more than tolerance, appended: in every span pair at the lowest
+ * places of a grid, and at `also` (NULL: nowhere). *worst: the least eigenvalue that was met, 0 if none is below. */
 batten_status function_cuts(batten_context *ctx, const function_space *space, const double *x, double tolerance,
-                            unsigned grid, function_matrix *cuts, double *worst);
+                            const function_place *also, function_matrix *cuts, double *worst);
 
 /* A proven lower bound of the least eigenvalue (signed as asked) over all constrained span pairs; at most
- * max(tolerance, 1/16 of it) off unless box_limit boxes are not enough. */
+ * max(tolerance, 1/16 of it) off unless box_limit boxes are not enough. *where: of the least that was met. */
 batten_status function_least(batten_context *ctx, const function_space *space, const double *x, double tolerance,
-                             size_t box_limit, double *least);
+                             size_t box_limit, double *least, function_place *where);
 
 typedef struct function_rounds_options {
   unsigned rounds;

@@ -7,7 +7,9 @@
  *     feasible, so that objectives never rise; boxes with active inequalities are quartered, and coefficients that
  *     are nearly singular get more directions. In the limit nothing convex is excluded.
  *   - where all signs are equal: the solution from below, with as much of (x^2 + y^2) / 2 added as its least
- *     eigenvalue asks for. That eigenvalue is bounded by subdivision, so this is a proof, too.
+ *     eigenvalue asks for. That eigenvalue is bounded by subdivision, so this is a proof, too, and where it is least
+ *     is where the next cut is. This nearly always closes the gap alone; the sufficient inequalities of high degrees,
+ *     which are weak, are then not needed.
  * Equal signs: the Hessian less `margin` times the identity is to be semidefinite, so that convexity is strict. With
  * both signs no bowl serves all, and where they touch the Hessian vanishes: nothing strict is asked for. */
 #include <string.h>
@@ -15,7 +17,7 @@
 #include "base/checked.h"
 #include "function_inner.h"
 
-enum { CUT_STEPS = 12, BOX_DEPTH = 8, ROW_LIMIT = 200000, LEAST_BOXES = 1000000 };
+enum { CUT_STEPS = 40, BOX_DEPTH = 8, ROW_LIMIT = 200000, LEAST_BOXES = 1000000 };
 
 typedef struct rounds_state {
   batten_context *ctx;
@@ -28,7 +30,7 @@ typedef struct rounds_state {
   size_t *row_box; /* [row_room] */
   size_t row_room, equalities;
   signed char *cut_active, *row_active; /* [rows + n] */
-  size_t cut_active_rows;
+  function_place least_at;              /* of the spline that was considered last */
   function_box *boxes;
   size_t box_count, box_room;
   double *outer, *inner, *best, *bowl, *work; /* [n] */
@@ -102,7 +104,7 @@ static double curvature_scale(const function_space *space, const double *x) {
 /* Takes x as the result when it is better and convex; where signs are equal it is made convex, which changes x. */
 static batten_status consider(rounds_state *s, double *x) {
   double least;
-  batten_status st = function_least(s->ctx, s->space, x, s->margin / 2, LEAST_BOXES, &least);
+  batten_status st = function_least(s->ctx, s->space, x, s->margin / 2, LEAST_BOXES, &least, &s->least_at);
   if (st < 0) return st;
   if (!s->space->opposite && least < s->margin / 2) {
     double add = s->margin - least;
@@ -137,11 +139,13 @@ static batten_status grow_active(rounds_state *s, size_t rows_before) {
 static batten_status from_below(rounds_state *s, unsigned round) {
   size_t n = s->space->n;
   /* Where a bowl makes it convex, cuts go on until that costs little; else to ever less curvature. */
-  double tolerance = s->scale * (s->space->opposite || s->opt->rows_only ? pow(0.1, 3 + round) : 1e-6);
+  bool bowl = !s->space->opposite && !s->opt->rows_only;
+  double tolerance = bowl ? s->margin : s->scale * pow(0.1, 3 + round);
+  const function_place *also = NULL;
   for (unsigned step = 0; step < CUT_STEPS; step++) {
     double worst, bound, begin = batten_now();
     size_t before = s->cuts.rows;
-    batten_status st = function_cuts(s->ctx, s->space, s->outer, tolerance, step < 2 ? 2 : 4, &s->cuts, &worst);
+    batten_status st = function_cuts(s->ctx, s->space, s->outer, tolerance, also, &s->cuts, &worst);
     if (st < 0) return st;
     s->info->time_rows += batten_now() - begin;
     if (s->cuts.rows == before) break;
@@ -153,9 +157,10 @@ static batten_status from_below(rounds_state *s, unsigned round) {
     if (!solved) break;
     memcpy(s->outer, s->work, n * sizeof *s->outer);
     s->lower = fmax(s->lower, bound);
-    if (!s->space->opposite && !s->opt->rows_only && worst > -0.1 * s->scale) {
+    if (bowl && worst > -0.1 * s->scale) {
       st = consider(s, s->work);
       if (st < 0) return st;
+      also = &s->least_at;
       if (close_enough(s)) break;
     }
     st = batten_progress(s->ctx, "fit", (round + (double)step / CUT_STEPS / 2) / s->opt->rounds);
@@ -326,7 +331,7 @@ static batten_status start(rounds_state *s, double *unconstrained) {
   st = consider(s, s->work);
   if (st < 0) return st;
   double least;
-  st = function_least(s->ctx, s->space, s->outer, s->margin / 2, LEAST_BOXES, &least);
+  st = function_least(s->ctx, s->space, s->outer, s->margin / 2, LEAST_BOXES, &least, &s->least_at);
   if (st < 0 || least < s->margin / 2) return st;
   s->info->margin = least; /* a minimum of all splines */
   s->objective = s->lower = objective_of(s, s->outer);
@@ -343,7 +348,7 @@ batten_status function_rounds(batten_context *ctx, const function_space *space, 
   if (st == BATTEN_OK) st = start(&s, unconstrained);
   for (unsigned round = 0; st == BATTEN_OK && round < opt->rounds && !close_enough(&s); round++) {
     st = from_below(&s, round);
-    if (st == BATTEN_OK) st = from_above(&s, round);
+    if (st == BATTEN_OK && !close_enough(&s)) st = from_above(&s, round);
     if (st < 0) break;
     info->upper[round] = s.objective;
     info->rounds = round + 1;

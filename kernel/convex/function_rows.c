@@ -430,9 +430,9 @@ static double least_at(const function_space *space, const uint32_t span[2], cons
 
 /* From a place to a nearby one that is worse, by steps that are halved. */
 static double descend(const function_space *space, const uint32_t span[2], const double *lower, const double *upper,
-                      const double *x, double step, double place[2], double z[2]) {
-  double best = least_at(space, span, place, x, z);
-  for (int halvings = 0; halvings < 5; step /= 2, halvings++)
+                      const double *x, double place[2], double z[2]) {
+  double best = least_at(space, span, place, x, z), step = 0.125;
+  for (int halvings = 0; halvings < 7; step /= 2, halvings++)
     for (int side = 0; side < 4; side++) {
       int i = side / 2;
       double there[2] = {place[0], place[1]}, w[2];
@@ -449,47 +449,65 @@ static double descend(const function_space *space, const uint32_t span[2], const
   return best;
 }
 
-/* Cuts of one span pair: of all places of the grid that are nearly as bad as the worst, and of the worst near it. */
+enum { CUT_GRID = 2 * (FUNCTION_ORDER - 1) };
+
+/* Whether none of the places around this one of a grid is worse; of equal ones the first counts. */
+static bool is_lowest(const unsigned grid[2], const double *values, size_t a, size_t b) {
+  double here = values[a * (CUT_GRID + 1) + b];
+  for (size_t i = a > 0 ? a - 1 : 0; i <= a + 1 && i <= grid[0]; i++)
+    for (size_t j = b > 0 ? b - 1 : 0; j <= b + 1 && j <= grid[1]; j++) {
+      double there = values[i * (CUT_GRID + 1) + j];
+      if (there < here || (there == here && (i < a || (i == a && j < b)))) return false;
+    }
+  return true;
+}
+
+/* Cuts of one span pair, from where the lowest places of a grid descend to. The grid is closer at the ends, where
+ * polynomials turn the fastest: with equal steps of that number valleys along the sides are not seen. */
 static double cut_span(const function_space *space, const uint32_t span[2], const double *x, double tolerance,
-                       unsigned grid, function_matrix *cuts) {
-  double lower[2], upper[2], worst = INFINITY, at[2] = {0}, z[2];
+                       function_matrix *cuts) {
+  unsigned grid[2];
+  double at[2][CUT_GRID + 1], lower[2], upper[2], worst = 0, values[(CUT_GRID + 1) * (CUT_GRID + 1)], z[2];
   for (int i = 0; i < 2; i++) {
     const double *knots = space->spline.axis[i].knots + space->span[i][span[i]];
     lower[i] = knots[0];
     upper[i] = knots[1];
+    grid[i] = 2 * space->spline.axis[i].degree;
+    for (unsigned k = 0; k <= grid[i]; k++) {
+      double part = (1 - cos(half_turn * k / grid[i])) / 2;
+      at[i][k] = (1 - part) * lower[i] + part * upper[i];
+    }
   }
-  for (int pass = 0; pass < 2; pass++) {
-    for (unsigned a = 0; a <= grid; a++)
-      for (unsigned b = 0; b <= grid; b++) {
-        double part[2] = {(double)a / grid, (double)b / grid};
-        double place[2] = {(1 - part[0]) * lower[0] + part[0] * upper[0],
-                           (1 - part[1]) * lower[1] + part[1] * upper[1]};
-        double value = least_at(space, span, place, x, z);
-        if (pass == 1 && value < -tolerance && value <= worst / 4) append_cut(space, span, place, z, cuts);
-        if (pass == 0 && value < worst) {
-          worst = value;
-          at[0] = place[0];
-          at[1] = place[1];
+  for (int pass = 0; pass < 2; pass++)
+    for (unsigned a = 0; a <= grid[0]; a++)
+      for (unsigned b = 0; b <= grid[1]; b++) {
+        double place[2] = {at[0][a], at[1][b]};
+        if (pass == 0) {
+          values[a * (CUT_GRID + 1) + b] = least_at(space, span, place, x, z);
+        } else if (is_lowest(grid, values, a, b)) {
+          double near = descend(space, span, lower, upper, x, place, z);
+          worst = fmin(worst, near);
+          if (near < -tolerance) append_cut(space, span, place, z, cuts);
         }
       }
-    if (worst > tolerance) return 0; /* nothing near zero here */
-  }
-  double near = descend(space, span, lower, upper, x, 0.5 / grid, at, z);
-  if (near < -tolerance && near < worst) append_cut(space, span, at, z, cuts);
-  return fmin(near, 0);
+  return worst;
 }
 
 batten_status function_cuts(batten_context *ctx, const function_space *space, const double *x, double tolerance,
-                            unsigned grid, function_matrix *cuts, double *worst) {
+                            const function_place *also, function_matrix *cuts, double *worst) {
   size_t points = (space->spline.axis[0].degree + 1) * (size_t)(space->spline.axis[1].degree + 1);
-  size_t most = (size_t)(grid + 1) * (grid + 1) + 1;
+  size_t most = (CUT_GRID + 1) * (CUT_GRID + 1) + 1;
   *worst = 0;
   for (size_t s = 0; s < space->spans[0] * space->spans[1]; s++) {
     uint32_t span[2] = {(uint32_t)(s / space->spans[1]), (uint32_t)(s % space->spans[1])};
     if (function_sign(space, span) == 0) continue;
     batten_status st = function_matrix_reserve(ctx, cuts, most, most * points);
     if (st < 0) return st;
-    *worst = fmin(*worst, cut_span(space, span, x, tolerance, grid, cuts));
+    *worst = fmin(*worst, cut_span(space, span, x, tolerance, cuts));
+    if (!also || also->span[0] != span[0] || also->span[1] != span[1]) continue;
+    double z[2], value = least_at(space, span, also->at, x, z);
+    *worst = fmin(*worst, value);
+    if (value < -tolerance) append_cut(space, span, also->at, z, cuts);
   }
   return BATTEN_OK;
 }

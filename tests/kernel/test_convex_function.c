@@ -135,6 +135,8 @@ static void fits(batten_context *ctx) {
   o = options(5, 2);
   o.smoothness[0] = 2;
   fit(ctx, "degree 5", hill, 0.1, 400, &o);
+  o = options(7, 1);
+  fit(ctx, "degree 7, where the Hessian dips between few places", saddle, 0.1, 400, &o);
   o = options(3, 6);
   o.smoothness[0] = o.smoothness[1] = 1;
   fit(ctx, "C1", hill, 0.1, 800, &o);
