@@ -17,7 +17,9 @@
 #include "base/checked.h"
 #include "function_inner.h"
 
-enum { CUT_STEPS = 40, BOX_DEPTH = 8, ROW_LIMIT = 200000, LEAST_BOXES = 1000000 };
+enum { CUT_STEPS = 40, CHOOSE_STEPS = 30, BOX_DEPTH = 8, ROW_LIMIT = 200000, LEAST_BOXES = 1000000 };
+
+enum { ROW_LEFT = 0, ROW_CHOSEN, ROW_ACTIVE };
 
 typedef struct rounds_state {
   batten_context *ctx;
@@ -26,11 +28,12 @@ typedef struct rounds_state {
   const function_rounds_options *opt;
   function_rounds_info *info;
   batten_qp_workspace *workspace;
-  function_matrix cuts, rows;
-  size_t *row_box; /* [row_room] */
+  function_matrix cuts, rows, chosen;
+  size_t *row_box, *chosen_row; /* [row_room] */
   size_t row_room, equalities;
-  signed char *cut_active, *row_active; /* [rows + n] */
-  function_place least_at;              /* of the spline that was considered last */
+  signed char *cut_active, *chosen_active; /* [rows + n] */
+  signed char *row_state;                  /* [row_room] of rows */
+  function_place least_at;                 /* of the spline that was considered last */
   function_box *boxes;
   size_t box_count, box_room;
   double *outer, *inner, *best, *bowl, *work; /* [n] */
@@ -63,11 +66,6 @@ static batten_status minimise(rounds_state *s, const function_matrix *rows, bool
   }
   o.x0 = start;
   o.active = active_start;
-  if (s->space->opposite && rows) { /* nearly parallel rows where signs meet: thousands of pivots, or circles */
-    o.engine = BATTEN_QP_INTERIOR;
-    o.hand_over = 0;
-    o.iteration_limit = 100;
-  }
   batten_qp_solution out = {.x = x, .active = active};
   batten_qp_info info;
   double begin = batten_now();
@@ -219,6 +217,12 @@ static batten_status make_rows(rounds_state *s, unsigned round) {
       size_t *grown = batten_realloc_array(s->ctx, s->row_box, room, sizeof *grown);
       if (!grown) return BATTEN_E_NOMEM;
       s->row_box = grown;
+      grown = batten_realloc_array(s->ctx, s->chosen_row, room, sizeof *grown);
+      if (!grown) return BATTEN_E_NOMEM;
+      s->chosen_row = grown;
+      signed char *state = batten_realloc_array(s->ctx, s->row_state, room, 1);
+      if (!state) return BATTEN_E_NOMEM;
+      s->row_state = state;
       s->row_room = room;
     }
     for (size_t r = before; r < s->rows.rows; r++) s->row_box[r] = b;
@@ -232,7 +236,8 @@ static batten_status refine_boxes(rounds_state *s) {
   size_t last = SIZE_MAX, count = s->box_count, per_box = s->rows.rows / (count ? count : 1) + 1;
   for (size_t r = s->equalities; r < s->rows.rows; r++) {
     size_t b = s->row_box[r];
-    if (!s->row_active[r] || b == last || s->boxes[b].depth == BOX_DEPTH || s->box_count * per_box > ROW_LIMIT)
+    if (s->row_state[r] != ROW_ACTIVE || b == last || s->boxes[b].depth == BOX_DEPTH ||
+        s->box_count * per_box > ROW_LIMIT)
       continue;
     last = b;
     function_box whole = s->boxes[b];
@@ -259,22 +264,64 @@ static batten_status refine_boxes(rounds_state *s) {
   return BATTEN_OK;
 }
 
-static batten_status from_above(rounds_state *s, unsigned round) {
+/* Appends the rows that x violates, and the equalities, to those chosen before; *more: whether there were any. */
+static batten_status choose_rows(rounds_state *s, const double *x, bool *more) {
+  const function_matrix *all = &s->rows;
+  *more = false;
+  for (size_t r = 0; r < all->rows; r++) {
+    size_t begin = all->starts[r], entries = all->starts[r + 1] - begin;
+    double value = -all->lower[r];
+    for (size_t k = begin; k < begin + entries; k++) value += all->values[k] * x[all->indices[k]];
+    if (s->row_state[r] != ROW_LEFT || (r >= s->equalities && value >= -1e-9)) continue; /* what programs leave */
+    batten_status st = function_matrix_reserve(s->ctx, &s->chosen, 1, entries);
+    if (st < 0) return st;
+    function_matrix *to = &s->chosen;
+    size_t at = to->starts[to->rows];
+    memcpy(to->indices + at, all->indices + begin, entries * sizeof *to->indices);
+    memcpy(to->values + at, all->values + begin, entries * sizeof *to->values);
+    to->lower[to->rows] = all->lower[r];
+    s->chosen_row[to->rows] = r;
+    to->upper[to->rows++] = all->upper[r];
+    to->starts[to->rows] = at + entries;
+    s->row_state[r] = ROW_CHOSEN;
+    *more = true;
+  }
+  return BATTEN_OK;
+}
+
+/* The minimum with all rows into s->work, by programs with the few that matter: those that the spline from below and
+ * then each minimum violates. */
+static batten_status minimise_above(rounds_state *s, bool *solved) {
+  const double *start = s->have_inner ? s->inner : s->best;
   double bound;
+  bool more;
+  *solved = false;
+  s->chosen.rows = 0;
+  if (s->rows.rows > 0) memset(s->row_state, ROW_LEFT, s->rows.rows);
+  batten_status st = choose_rows(s, s->outer, &more);
+  for (unsigned step = 0; st == BATTEN_OK && step < CHOOSE_STEPS; step++) {
+    signed char *active = batten_realloc_array(s->ctx, s->chosen_active, s->chosen.rows + s->space->n, 1);
+    if (!active) return BATTEN_E_NOMEM;
+    s->chosen_active = active;
+    st = minimise(s, &s->chosen, true, start, NULL, s->work, active, &bound, solved);
+    if (st < 0 || !*solved) return st;
+    st = choose_rows(s, s->work, &more);
+    if (st < 0 || !more) return st;
+    *solved = false;
+  }
+  return st;
+}
+
+static batten_status from_above(rounds_state *s, unsigned round) {
   bool solved;
   batten_status st = round == 0 ? first_boxes(s) : refine_boxes(s);
   if (st == BATTEN_OK) st = make_rows(s, round);
   if (st < 0) return st;
   s->info->rows[round] = s->rows.rows;
-  signed char *active = batten_realloc_array(s->ctx, s->row_active, s->rows.rows + s->space->n, 1);
-  if (!active) return BATTEN_E_NOMEM;
-  s->row_active = active;
-  st = minimise(s, &s->rows, true, s->have_inner ? s->inner : s->best, NULL, s->work, active, &bound, &solved);
-  if (st < 0) return st;
-  if (!solved) {
-    memset(active, 0, s->rows.rows + s->space->n);
-    return BATTEN_OK;
-  }
+  st = minimise_above(s, &solved);
+  if (st < 0 || !solved) return st;
+  for (size_t k = 0; k < s->chosen.rows; k++)
+    if (s->chosen_active[k]) s->row_state[s->chosen_row[k]] = ROW_ACTIVE;
   memcpy(s->inner, s->work, s->space->n * sizeof *s->inner);
   s->have_inner = true;
   return consider(s, s->work);
@@ -367,9 +414,12 @@ batten_status function_rounds(batten_context *ctx, const function_space *space, 
   batten_qp_workspace_free(s.workspace);
   function_matrix_free(ctx, &s.cuts);
   function_matrix_free(ctx, &s.rows);
+  function_matrix_free(ctx, &s.chosen);
   batten_free(ctx, s.row_box);
   batten_free(ctx, s.cut_active);
-  batten_free(ctx, s.row_active);
+  batten_free(ctx, s.chosen_active);
+  batten_free(ctx, s.row_state);
+  batten_free(ctx, s.chosen_row);
   batten_free(ctx, s.boxes);
   batten_free(ctx, s.outer);
   return st;
