@@ -498,8 +498,9 @@ static batten_status judge(const function_fit *f, const function_rounds_info *ro
     return batten_fail(
         f->ctx, BATTEN_W_STOPPED,
         "the mean square with tension is %.6g, that of the best such function at least %.6g: more than "
-        "opt.gap_tol = %g apart; raise opt.rounds, or use fewer spans",
-        info->objective, info->objective_lower, f->opt.gap_tol);
+        "opt.gap_tol = %g apart; %s, or use fewer spans",
+        info->objective, info->objective_lower, f->opt.gap_tol,
+        info->rounds < f->opt.rounds ? "raise that, which more rounds would not reach" : "raise opt.rounds");
   return BATTEN_OK;
 }
 

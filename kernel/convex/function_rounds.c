@@ -38,7 +38,8 @@ typedef struct rounds_state {
   size_t box_count, box_room;
   double *outer, *inner, *best, *bowl, *work; /* [n] */
   bool have_inner;
-  unsigned stuck; /* programs that were too hard: after two of them the next would be no easier */
+  unsigned stuck; /* programs that were too hard, and rounds that closed less than a tenth of the gap: after two of
+                     them the next would be no better */
   double margin, scale, objective, lower;
 } rounds_state;
 
@@ -394,12 +395,14 @@ batten_status function_rounds(batten_context *ctx, const function_space *space, 
   batten_status st = allocate(&s);
   if (st == BATTEN_OK) st = start(&s, unconstrained);
   for (unsigned round = 0; st == BATTEN_OK && round < opt->rounds && !close_enough(&s); round++) {
+    double gap = s.objective - s.lower;
     st = from_below(&s, round);
     if (st == BATTEN_OK && !close_enough(&s)) st = from_above(&s, round);
     if (st < 0) break;
     info->upper[round] = s.objective;
     info->rounds = round + 1;
     st = batten_progress(ctx, "fit", (round + 1.0) / opt->rounds);
+    s.stuck += s.objective - s.lower > 0.9 * gap;
     if (s.stuck > 1) break;
   }
   if (st == BATTEN_OK) st = bound_squares(&s);

@@ -353,6 +353,27 @@ static void invariances(batten_context *ctx) {
   batten_surface_free(s);
 }
 
+/* Programs of both kinds, with one thread and with four. */
+static void threads(batten_context *ctx) {
+  enum { N = 400 };
+  double points[3 * N];
+  signed char half[16];
+  for (int k = 0; k < 16; k++) half[k] = k / 4 < 2 ? 1 : -1;
+  scatter(wave, N, 0.05, 7, points);
+  batten_convex_function_options o = options(3, 4);
+  o.signs = half;
+  o.rounds = 2;
+  batten_context *four = t_context(NULL, NULL, 4);
+  batten_surface *s[2] = {NULL, NULL};
+  for (int k = 0; k < 2; k++)
+    T_CHECK(batten_convex_function_fit(k ? four : ctx, N, points, &o, &s[k], NULL, NULL) >= 0, "fitted");
+  const double *x[2] = {batten_surface_get(s[0]).control_points, batten_surface_get(s[1]).control_points};
+  T_CHECK(memcmp(x[0], x[1], 3 * 49 * sizeof(double)) == 0, "same bits with four threads");
+  batten_surface_free(s[0]);
+  batten_surface_free(s[1]);
+  batten_context_free(four);
+}
+
 /* The sufficient inequalities alone: sums fall with the rounds, down to the lower bound. */
 static void asymptotics(batten_context *ctx) {
   enum { N = 300, SPANS = 3 };
@@ -402,6 +423,7 @@ int main(void) {
   one_dimension(ctx);
   unconstrained(ctx);
   invariances(ctx);
+  threads(ctx);
   asymptotics(ctx);
   batten_context_free(ctx);
   return t_done();

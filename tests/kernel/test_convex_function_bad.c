@@ -32,10 +32,10 @@ static void options(batten_context *ctx) {
   batten_convex_function_options o = fine;
   double two[2] = {0.5, 0.4}, outside[1] = {2}, weights[N];
   signed char signs[16];
-#define REFUSED(set, part)                                \
-  do {                                                    \
-    o = fine;                                             \
-    set;                                                  \
+#define REFUSED(set, part)                                          \
+  do {                                                              \
+    o = fine;                                                       \
+    set;                                                            \
     T_STATUS(try(ctx, N, points, &o), BATTEN_E_INVALID, ctx, part); \
   } while (0)
   REFUSED(o.struct_size = 1, "struct_size: 1");
@@ -49,7 +49,8 @@ static void options(batten_context *ctx) {
   REFUSED(o.gap_tol = 0, "opt.gap_tol: 0");
   REFUSED(o.rounds = 0, "opt.rounds: 0; give 1 to 20");
   REFUSED(o.rounds = 21, "opt.rounds: 21");
-  REFUSED((o.domain[0][0] = 0, o.domain[0][1] = 1, o.domain[1][0] = 0, o.domain[1][1] = 0.5), "is outside the domain");
+  REFUSED((o.domain[0][0] = 0, o.domain[0][1] = 1, o.domain[1][0] = 0, o.domain[1][1] = 0.5),
+          "is outside the domain");
   REFUSED(o.domain[0][0] = 0, "opt.domain[0]: 0 to nan");
   REFUSED((o.domain[0][0] = 2, o.domain[0][1] = 1, o.domain[1][0] = 0, o.domain[1][1] = 1), "opt.domain[0]: 2 to 1");
   REFUSED(o.break_count[0] = 2, "opt.breaks[0]: NULL; give [2]");
@@ -99,7 +100,8 @@ static void points_refused(batten_context *ctx) {
   T_STATUS(try(ctx, N, points, NULL), BATTEN_E_INVALID, ctx, "too far from 0");
 }
 
-/* One round that is told to come very near: done, but not as near. */
+/* One round that is told to come very near: done, but not as near; and all rounds that are of use, told to come as
+ * near as no program can tell. */
 static void stopped(batten_context *ctx) {
   double points[3 * N];
   signed char signs[16];
@@ -110,13 +112,20 @@ static void stopped(batten_context *ctx) {
   o.gap_tol = 1e-9;
   o.signs = signs;
   T_STATUS(try(ctx, N, points, &o), BATTEN_W_STOPPED, ctx, "raise opt.rounds");
+  o.rounds = 20;
+  o.spans[0] = 2;
+  o.spans[1] = 1;
+  signs[1] = -1;
+  o.gap_tol = 1e-13;
+  T_STATUS(try(ctx, N, points, &o), BATTEN_W_STOPPED, ctx, "more rounds would not reach");
 }
 
 static batten_status small(batten_context *ctx, void *arg) {
   batten_convex_function_options o = batten_convex_function_options_default();
   o.spans[0] = o.spans[1] = 2;
-  o.degree[0] = o.degree[1] = 2;
-  o.rounds = 2;
+  const signed char halves[4] = {1, 1, -1, -1};
+  o.signs = halves;
+  o.rounds = 1;
   batten_surface *s = NULL, *u = NULL;
   batten_status st = batten_convex_function_fit(ctx, N, arg, &o, &s, &u, NULL);
   if (st >= 0) {
