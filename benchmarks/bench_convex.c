@@ -83,10 +83,44 @@ static void run_paper(batten_context *ctx, size_t seeds, unsigned rounds) {
 
 /* ---- random sets --------------------------------------------------------------------------------- */
 
+typedef struct trial {
+  size_t unknowns;
+  bool certified;
+  double rows, boxes, seconds, ratio;
+} trial;
+
+/* One row for each range of unknowns. */
+static void print_trials(size_t count, const trial *trials) {
+  static const size_t bounds[] = {27, 36, 60, 90, 147};
+  double *of[4];
+  for (int k = 0; k < 4; k++) of[k] = convex_allocate(count, sizeof(double));
+  printf(
+      "| unknowns | sets | certified | rows of the last round: median, most | boxes: median, most | "
+      "seconds: median, 90 %%, most | convex / unconstrained: median, 90 %% |\n|---|---|---|---|---|---|---|\n");
+  for (size_t b = 1; b < sizeof bounds / sizeof *bounds; b++) {
+    size_t n = 0, certified = 0, least = b == 1 ? bounds[0] : bounds[b - 1] + 1;
+    for (size_t i = 0; i < count; i++) {
+      const trial *t = &trials[i];
+      if (t->unknowns < least || t->unknowns > bounds[b]) continue;
+      const double figures[4] = {t->rows, t->boxes, t->seconds, t->ratio};
+      for (int k = 0; k < 4; k++) of[k][n] = figures[k];
+      certified += t->certified;
+      n++;
+    }
+    printf("| %zu to %zu | %zu | %zu | %.0f, %.0f | %.0f, %.0f | %.2f, %.2f, %.1f | %.2f, %.2f |\n", least, bounds[b],
+           n, certified, quantile(n, of[0], 0.5), quantile(n, of[0], 1), quantile(n, of[1], 0.5),
+           quantile(n, of[1], 1), quantile(n, of[2], 0.5), quantile(n, of[2], 0.9), quantile(n, of[2], 1),
+           quantile(n, of[3], 0.5), quantile(n, of[3], 0.9));
+  }
+  for (int k = 0; k < 4; k++) free(of[k]);
+}
+
 static void run_random(batten_context *ctx, size_t sets, double dent) {
   size_t counts[3] = {0, 0, 0}, planes = 0, found = 0, wide = 0, failed = 0;
   double *times = convex_allocate(sets, sizeof *times), *rows = convex_allocate(sets, sizeof *rows);
   double *misfits = convex_allocate(sets, sizeof *misfits);
+  trial *trials = convex_allocate(sets, sizeof *trials);
+  memset(trials, 0, sets * sizeof *trials);
   printf("\n## %zu random convex sets, dent %g deviations of noise\n", sets, dent);
   for (uint64_t seed = 0; seed < sets; seed++) {
     convex_rule rule = convex_rule_random(seed);
@@ -115,6 +149,9 @@ static void run_random(batten_context *ctx, size_t sets, double dent) {
     } else {
       counts[st == BATTEN_OK ? 0 : st == BATTEN_W_SHAPE ? 1 : 2]++;
       planes += f.plane != 0;
+      trials[seed] = (trial){f.unknowns,  f.convexity.certified != 0,
+                             rows[seed],  f.rounds ? (double)f.boxes_per_round[f.rounds - 1] : 0,
+                             times[seed], f.lsq / f.lsq_unconstrained};
       wide += inside >= 30;
       found += inside >= 30 && st == BATTEN_W_SHAPE;
       printf("csv,random,%g,%zu,%d,%d,%zu,%u,%u,%.4g,%s,%.6g,%.6g,%.6g,%.2f,%zu,%zu,%.4f\n", dent, (size_t)seed,
@@ -125,6 +162,7 @@ static void run_random(batten_context *ctx, size_t sets, double dent) {
     batten_surface_free(surface);
     convex_scene_free(&s);
   }
+  if (dent == 0) print_trials(sets, trials);
   printf("certified and accepted %zu, refused by shape %zu (planes %zu), not proven %zu, failed %zu\n", counts[0],
          counts[1], planes, counts[2], failed);
   if (dent > 0) printf("dents of 30 points or more: %zu, found %zu\n", wide, found);
@@ -133,6 +171,7 @@ static void run_random(batten_context *ctx, size_t sets, double dent) {
   printf("rows of the last round: median %.0f, most %.0f; misfit: median %.1f, most %.1f\n",
          quantile(sets, rows, 0.5), quantile(sets, rows, 1), quantile(sets, misfits, 0.5),
          quantile(sets, misfits, 1));
+  free(trials);
   free(misfits);
   free(rows);
   free(times);
@@ -142,7 +181,7 @@ static void run_random(batten_context *ctx, size_t sets, double dent) {
 
 static void run_times(batten_context *ctx) {
   printf("\n## Times against the inequalities: 48 unknowns, 51 points, milliseconds a round\n");
-  printf("%9s %9s %9s %9s %9s\n", "rows", "boxes", "generate", "program", "correct");
+  printf("| rows | boxes | inequalities | quadratic program | parameter correction |\n|---|---|---|---|---|\n");
   for (uint64_t seed = 0; seed < 8; seed++) {
     convex_scene s = convex_scene_paper(seed);
     for (unsigned rounds = 1; rounds <= 10; rounds += 3) {
@@ -157,9 +196,8 @@ static void run_times(batten_context *ctx) {
           rows += (double)f.rows_per_round[k] / f.rounds;
           boxes += (double)f.boxes_per_round[k] / f.rounds;
         }
-        printf("%9.0f %9.1f %9.2f %9.2f %9.3f\n", rows, boxes, 1e3 * f.time_rows_s / f.rounds,
+        printf("| %.0f | %.1f | %.2f | %.2f | %.2f |\n", rows, boxes, 1e3 * f.time_rows_s / f.rounds,
                1e3 * f.time_qp_s / f.rounds, 1e3 * f.time_correction_s / f.rounds);
-        printf("csv,times,%.0f,%.5f,%.5f\n", rows, f.time_rows_s / f.rounds, f.time_qp_s / f.rounds);
       }
       batten_surface_free(surface);
     }

@@ -498,10 +498,10 @@ static batten_status judge(fit *f) {
   for (int k = 0; k < 2; k++) there[k] = f->domain[k][0] + place[k] * (f->domain[k][1] - f->domain[k][0]);
   return batten_fail(
       f->ctx, BATTEN_W_SHAPE,
-      "points: they bend inwards by more than noise does (%.1f standard deviations): near (%g, %g) the mean of "
-      "%zu points, points[%zu] the deepest of them, lies %g inside the chord of those on both sides; leave out the "
-      "points of the dent, split the data, or accept the flattened surface",
-      v->misfit, there[0], there[1], v->points, v->worst, v->depth / f->unit);
+      "points: they bend inwards by more than noise does (%.1f standard deviations): near (%g, %g) the "
+      "mean of %zu point%s, points[%zu] the deepest, lies %g inside the chord of those on both sides; leave "
+      "out the points of the dent, split the data, or accept the flattened surface",
+      v->misfit, there[0], there[1], v->points, v->points == 1 ? "" : "s", v->worst, v->depth / f->unit);
 }
 
 batten_status batten_convex_fit(batten_context *ctx, size_t count, const double *points,

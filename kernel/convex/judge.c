@@ -23,6 +23,9 @@
 static const double MISFIT = 6;
 /* Between two and three points of even weight: from three on a square has a mean. */
 static const double FEWEST = 2.5;
+/* A row with a square of fewer counts so much less: a single point may be an outlier of a noise that has more of them
+ * than the normal distribution. It still shows a dent of few points that is far deeper than the noise. */
+static const double FEW = 0.5;
 /* How far the middle one of three may lie beside the chord, of its length. */
 static const double BESIDE = 0.05;
 /* 36 = MISFIT^2: more points of a square count as 36, so that a dent below the noise itself, which matters to nobody,
@@ -154,10 +157,12 @@ static void scan_level(scan *s, unsigned level, const int *shift) {
         if (!inner) continue;
         const square *q = &s->squares[i * side + j];
         ptrdiff_t step = steps[d][0] * (ptrdiff_t)side + steps[d][1];
-        if (points_of(q) < FEWEST || points_of(q - step) < FEWEST || points_of(q + step) < FEWEST) continue;
+        double fewest = fmin(points_of(q), fmin(points_of(q - step), points_of(q + step)));
+        if (!(fewest > 0)) continue;
         double deviation = 1, depth = inside_chord(s, q - step, q, q + step, &deviation);
-        if (!(depth > s->misfit * deviation)) continue;
-        s->misfit = depth / deviation;
+        double misfit = (fewest < FEWEST ? FEW : 1) * depth / deviation;
+        if (!(misfit > s->misfit)) continue;
+        s->misfit = misfit;
         s->depth = depth;
         s->level = level;
         memcpy(s->shift, shift, sizeof s->shift);

@@ -101,7 +101,9 @@ static void test_bilge(batten_context *ctx, const char *name, size_t count, cons
 
 /* A panel of 1.4 x 1.1 m, 0.2 m high, points every 5 cm measured to 0.1 mm, and a dent. */
 static void test_panel(batten_context *ctx) {
-  for (int dented = 0; dented < 2; dented++) {
+  static const double sizes[] = {0, 0.15, 0.2, 0.4}; /* of the dent: none, of 7, 13 and 50 points */
+  for (size_t k = 0; k < sizeof sizes / sizeof *sizes; k++) {
+    bool dented = sizes[k] > 0;
     convex_scene s = convex_scene_make(&(convex_rule){.body = CONVEX_PARABOLOID,
                                                       .count = 600,
                                                       .axes = {1.4, 1.1, 0.9},
@@ -109,7 +111,7 @@ static void test_panel(batten_context *ctx) {
                                                       .noise = 1e-4,
                                                       .grid = true,
                                                       .dent_depth = dented ? 0.02 : 0,
-                                                      .dent_size = 0.2,
+                                                      .dent_size = sizes[k],
                                                       .dent_at = {0.15, -0.1}});
     batten_convex_info info;
     batten_status st = fit(ctx, dented ? "panel with a dent" : "panel", s.count, s.points, 3, &info);
