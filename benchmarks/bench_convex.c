@@ -66,10 +66,10 @@ static void run_paper(batten_context *ctx, size_t seeds, unsigned rounds) {
   printf("\n## The paper's experiment, %zu seeds, %u rounds\n", seeds, rounds);
   printf("%-24s %9s %9s %9s %9s %9s %9s\n", "", "paper", "least", "10 %", "median", "90 %", "most");
   for (int k = 0; k < FIGURES && done; k++) {
-    printf("%-24s %9.3f", names[k], paper[k]);
+    printf("%-24s %9.4g", names[k], paper[k]);
     for (int q = 0; q < 5; q++) {
       static const double at[5] = {0, 0.1, 0.5, 0.9, 1};
-      printf(" %9.3f", quantile(done, values[k], at[q]));
+      printf(" %9.3g", quantile(done, values[k], at[q]));
     }
     printf("\n");
   }
