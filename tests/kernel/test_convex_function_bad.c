@@ -122,10 +122,12 @@ static void stopped(batten_context *ctx) {
 
 static batten_status small(batten_context *ctx, void *arg) {
   batten_convex_function_options o = batten_convex_function_options_default();
-  o.spans[0] = o.spans[1] = 2;
-  const signed char halves[4] = {1, 1, -1, -1};
+  o.spans[0] = 2;
+  o.spans[1] = 1;
+  const signed char halves[2] = {1, -1};
   o.signs = halves;
-  o.rounds = 1;
+  o.rounds = 2;
+  o.gap_tol = 0.1;
   batten_surface *s = NULL, *u = NULL;
   batten_status st = batten_convex_function_fit(ctx, N, arg, &o, &s, &u, NULL);
   if (st >= 0) {
