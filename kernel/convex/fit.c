@@ -6,7 +6,8 @@
  * inside the inequalities. Where a round gains too little the blend shrinks, so that the next reference is nearer to
  * the best surface, before the rounds end. Beside it the fit without inequalities takes the same rounds.
  *
- * What comes out is proven by batten_surface_certify_convex, and compared with the unconstrained fit (judge.c). */
+ * What comes out is proven by batten_surface_certify_convex. Whether the points are those of a convex surface at all is
+ * asked of the points themselves (judge.c) and of the unconstrained fit. */
 #include "fit_inner.h"
 
 #include "base/checked.h"

@@ -138,9 +138,11 @@ typedef struct batten_convex_info {
  *                    how much.
  * BATTEN_W_ACCURACY  not proven; the text says where
  * Without `parameters` a domain that is all NaN is [0, 1]^2. Same bits for any number of threads, and for points
- * scaled by a power of two; sums and curvatures out of the range of doubles are then INFINITY or 0. Bytes: some 40 n^2, n control points, and the inequalities. Fails: INVALID (points on a
- * line, all parameters equal, parameters outside the domain, named), NOMEM, TOO_LARGE, SINGULAR (the parameters lie on
- * a conic of parallel axes, or without tension do not determine the control points), CANCELLED. */
+ * scaled by a power of two; sums and curvatures out of the range of doubles are then INFINITY or 0. Bytes: some
+ * 40 n^2, n control points, and the inequalities.
+ * Fails: INVALID (points on a line, all parameters equal, parameters outside the domain, named), NOMEM, TOO_LARGE,
+ * SINGULAR (the parameters lie on a conic of parallel axes, or without tension do not determine the control points),
+ * CANCELLED. */
 BATTEN_API batten_status batten_convex_fit(batten_context *ctx, size_t count, const double *points,
                                            const batten_convex_options *opt, batten_surface **out,
                                            batten_surface **unconstrained, batten_convex_info *info);
