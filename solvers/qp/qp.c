@@ -481,7 +481,7 @@ static batten_status solve(solver *s) {
   if (st >= 0) st = blend(s);
   if (st < 0) return st;
   s->info.not_convex_index = s->proof == BATTEN_E_NOT_CONVEX ? s->task.not_convex_index : s->n;
-  s->info.cancelled = s->stop == BATTEN_E_CANCELLED;
+  s->info.cancelled = s->stop == BATTEN_E_CANCELLED && !optimal(s); /* the last step may have come in time */
   s->info.iterations = s->point.iterations;
   s->info.factorizations = s->point.factorizations;
   s->info.proximal_steps = s->task.proximal_steps;

@@ -450,6 +450,8 @@ static void cancel_everywhere(const char *name, case_of *c) {
     cancelled += st == BATTEN_E_CANCELLED;
     stopped += st == BATTEN_W_STOPPED;
     ok = memory.live == 1 && (st == BATTEN_OK || st == BATTEN_E_CANCELLED || st == BATTEN_W_STOPPED);
+    if (st == BATTEN_W_STOPPED) ok = ok && info.cancelled;
+    if (st == BATTEN_OK) ok = ok && !info.cancelled;
     if (st == BATTEN_W_STOPPED) ok = ok && info.primal_residual <= 1e-9 * (1 + info.primal_scale);
     if (!ok) printf("# progress call %zu: %s %s\n", k, batten_status_name(st), batten_error(host));
     batten_context_free(host);
