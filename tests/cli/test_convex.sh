@@ -141,9 +141,9 @@ holds w.json rms 'x < 0.04'
 
 # ---- every format -------------------------------------------------------------------------------
 
-run 0 "" convex points.xyz --quiet -o a.step -o a.stp -o a.iges -o a.igs -o a.vtu -o a.ply -o a.obj -o a.stl -o a.off -o a.vtp \
+run 0 "" convex points.xyz --quiet -o a.step -o a.stp -o a.iges -o a.igs -o a.vtu -o a.ply -o a.obj -o a.stl -o a.off -o a.vtp -o a.vtk \
   --unconstrained b.json
-for format in step stp iges igs vtu ply obj stl off vtp; do check "a.$format is there" test -s a.$format; done
+for format in step stp iges igs vtu ply obj stl off vtp vtk; do check "a.$format is there" test -s a.$format; done
 run 0 "" inspect b.json --report b.report.json
 is b.report.json certified False
 run 0 "" convex points.xyz --quiet --function --concave --picture f.png --size 300,200
