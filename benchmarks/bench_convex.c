@@ -5,6 +5,7 @@
  * 2. Random convex data sets: bodies, outlines, 30 to 5,000 points, noise to 10 %, degrees (2, 2) to (6, 6).
  * 3. The same with dents of six deviations of the noise.
  * 4. Times of a round against the inequalities: 48 unknowns, one core.
+ * 5. Functions: distance from the lower bound, inequalities, times by degree and spans.
  * Each result is certified by batten_surface_certify_convex; what is not is counted. CSV lines start with "csv,". */
 #include <batten/batten.h>
 #include <batten/convex.h>
@@ -205,6 +206,43 @@ static void run_times(batten_context *ctx) {
   }
 }
 
+/* ---- functions ------------------------------------------------------------------------------------ */
+
+static void run_function(batten_context *ctx, const char *name, convex_function function, size_t count,
+                         unsigned degree, unsigned spans) {
+  convex_scene s = convex_scene_function(function, count, 0.1, 1);
+  batten_convex_function_options o = batten_convex_function_options_default();
+  batten_convex_function_info f = {0};
+  batten_surface *surface = NULL;
+  for (int k = 0; k < 2; k++) {
+    o.degree[k] = degree;
+    o.spans[k] = spans;
+  }
+  double start = batten_now();
+  batten_status st = batten_convex_function_fit(ctx, s.count, s.points, &o, &surface, NULL, &f);
+  printf("| %s | %zu | %u | %u x %u | %zu | %.2g %% | %zu | %zu | %u | %.2f | %s |\n", name, count, degree, spans,
+         spans, f.unknowns, 100 * (1 - f.objective_lower / f.objective),
+         f.rounds ? f.rows_per_round[f.rounds - 1] : 0, f.rows_outer, f.rounds, batten_now() - start,
+         f.convexity.certified ? st == BATTEN_OK ? "yes" : "yes, gap left" : "no");
+  fflush(stdout);
+  batten_surface_free(surface);
+  convex_scene_free(&s);
+}
+
+static void run_functions(batten_context *ctx) {
+  static const unsigned degrees[] = {2, 3, 5, 7};
+  printf(
+      "\n## Convex functions, noise 0.1\n| data | points | degree | spans | unknowns | above the lower bound | "
+      "sufficient inequalities | necessary ones | rounds | seconds | proven |\n"
+      "|---|---|---|---|---|---|---|---|---|---|---|\n");
+  for (size_t d = 0; d < sizeof degrees / sizeof *degrees; d++)
+    for (unsigned spans = 1; spans <= 4; spans += 3) {
+      run_function(ctx, "soft maximum", CONVEX_F_SOFT_MAX, 400, degrees[d], spans);
+      run_function(ctx, "roof", CONVEX_F_ROOF, 400, degrees[d], spans);
+    }
+  run_function(ctx, "soft maximum", CONVEX_F_SOFT_MAX, 2000, 3, 20);
+}
+
 int main(int argc, char **argv) {
   size_t seeds = argc > 1 ? strtoul(argv[1], NULL, 10) : 100, sets = argc > 2 ? strtoul(argv[2], NULL, 10) : 500;
   batten_context *ctx = NULL;
@@ -220,6 +258,7 @@ int main(int argc, char **argv) {
     run_random(ctx, sets / 5, 6);
   }
   run_times(ctx);
+  run_functions(ctx);
   batten_context_free(ctx);
   return 0;
 }

@@ -58,7 +58,7 @@ static const cli_option table[] = {
     {"parameters", OPT_PARAMETERS, "HOW",
      "project (into the best plane), floater (shape preserving, on the triangles of the\n"
      "file or those of Delaunay) or file (columns u v); default auto: file, else project"},
-    {"rounds-tol", OPT_ROUNDS_TOL, "T", "stop when a round lowers the sum by a smaller part; default 1e-3"},
+    {"rounds-tol", OPT_ROUNDS_TOL, "T", "a round that lowers the sum by a smaller part brings the last one nearer;\ndefault 1e-3"},
     {"correction", OPT_CORRECTION, "N", "passes of parameter correction in a round, 0 keeps them; default 3"},
     {"margin", OPT_MARGIN, "M", "inequalities hold by this part of what the reference has; default 1e-3"},
     {"function", OPT_FUNCTION, NULL, "fit z = f(x, y), convex"},

@@ -84,7 +84,8 @@ static void print_sums(const convex_work *w) {
     const batten_convex_function_info *g = &w->function_info;
     cli_line("sums", "unconstrained %.6g, result %.6g, which none of this shape undercuts by more than %.2g %%",
              g->lsq_unconstrained, g->lsq, 100 * fmax(0, 1 - g->objective_lower / g->objective));
-    cli_line("inequalities", "%zu in round %u", g->rows_per_round[g->rounds ? g->rounds - 1 : 0], g->rounds);
+    cli_line("inequalities", "%zu necessary ones, %zu sufficient ones in round %u", g->rows_outer,
+             g->rows_per_round[g->rounds ? g->rounds - 1 : 0], g->rounds);
     cli_line("deviation", "rms %.4g, largest %.4g at point %zu", g->rms, g->max_error, g->max_error_index);
     return;
   }

@@ -98,8 +98,8 @@ enum { BATTEN_CONVEX_ROUNDS_MAX = 100 };
 typedef struct batten_convex_info {
   size_t unknowns;                /* three a control point */
   double lsq_unconstrained;       /* weighted sums of squares, caller's unit^2: without inequalities, same rounds of
-                                     parameter correction and one more from the result's
-                                     parameters, least over them */
+                                     parameter correction and one more from the result's parameters, least over
+                                     them */
   double lsq_unconstrained_first; /* the same at the first parameters */
   double lsq_reference;           /* first reference surface, first parameters; NaN: none was found */
   double lsq;                     /* of the result */
@@ -161,7 +161,7 @@ typedef struct batten_convex_function_options {
   const double *weights;    /* [count] >= 0, NULL = ones */
   double tension;  /* weight of the integral of f_xx^2 + 2 f_xy^2 + f_yy^2 beside the mean square, domain scaled
                       to [0, 1]^2, >= 0. Default 1e-8. */
-  double gap_tol;  /* refine the inequalities until the sum of squares is within this part of the proven lower
+  double gap_tol;  /* refine the inequalities until the objective is within this part of its lower
                       bound, > 0. Default 1e-3. */
   unsigned rounds; /* of refinement at most, 1 .. 20; fewer once two of them closed less than a tenth of the gap each.
                       Default 10. */
@@ -177,7 +177,8 @@ typedef struct batten_convex_function_info {
   double rms, max_error;
   size_t max_error_index;
   unsigned rounds;
-  size_t rows_per_round[20]; /* sufficient inequalities */
+  size_t rows_per_round[20]; /* sufficient inequalities; 0 where the fit from below could be made convex for next to
+                                nothing */
   size_t rows_outer;         /* necessary ones */
   double slack;              /* of the certificate, see batten_convexity_options: 0 where all is strictly convex */
   double gauss_min, gauss_max;
