@@ -5,7 +5,9 @@
 #include <batten/base.h>
 #include <batten/blas.h>
 #include <batten/carrier.h>
+#include <batten/contour.h>
 #include <batten/convex.h>
+#include <batten/curve.h>
 #include <batten/field.h>
 #include <batten/lsq.h>
 #include <batten/matrix.h>

@@ -206,6 +206,68 @@ BATTEN_API batten_status batten_write_surface(batten_context *ctx, const batten_
  * Fails: IO, FORMAT, INVALID (unknown extension), NOMEM, TOO_LARGE, CANCELLED; *out untouched then. */
 BATTEN_API batten_status batten_read_surface(batten_context *ctx, const char *path, batten_surface **out);
 
+/* ---- contours and planar curves ----------------------------------------------------------------- */
+
+/* Where the coordinates of a plane lie in space: origin + x axes[0] + y axes[1], axes of length 1 at right angles. */
+typedef struct batten_plane {
+  double origin[3], axes[2][3];
+} batten_plane;
+
+/* Sequences of points, each in a plane. */
+typedef struct batten_contours {
+  size_t count;
+  size_t *starts;       /* [count + 1] contour i has points starts[i] .. starts[i + 1] - 1 */
+  double *points;       /* [starts[count]][2] */
+  double *parameters;   /* [starts[count]] or NULL */
+  double *weights;      /* [starts[count]] or NULL */
+  batten_plane *planes; /* [count] or NULL: the file is planar */
+} batten_contours;
+
+/* Text (.txt .xyz .csv .tsv .asc .dat, also .gz), one contour or several:
+ *   blocks of lines "x y" or "x y z" parted by blank lines; or each after a line "contour N" (N points follow); or with
+ *   a line of names above the numbers, of which x y z t (parameter) w (weight) contour (its number or name; rows of one
+ *   contour need not be neighbours) are taken.
+ * Points with z lie in one plane for each contour, to 1e-6 of its size: where a coordinate is constant, the plane's axes
+ * are the other two in the order x y, y z, x z; else those of the best plane. Free with batten_contours_free. Fails as batten_read_points. */
+BATTEN_API batten_status batten_read_contours(batten_context *ctx, const char *path, batten_contours *out);
+BATTEN_API void batten_contours_free(batten_context *ctx, batten_contours *contours);
+
+typedef struct batten_write_curves_options {
+  size_t struct_size;
+  const batten_plane *planes; /* [count] where the curves lie; NULL = z = 0. Default NULL. */
+  batten_length_unit unit;    /* STEP, IGES. Default MM. */
+  batten_step_schema schema;  /* STEP. Default AP214. */
+  const char *name;           /* STEP, IGES: of the product, UTF-8; NULL = the file's name without its extension */
+  const char *time_stamp;     /* STEP, IGES: as in batten_write_network_options */
+  double tolerance;           /* .svg of degree above 3, .csv, .vtk, .vtp: distance of what is written from the curve,
+                                 caller's unit; 0 = 1e-4 of the size. Default 0. */
+} batten_write_curves_options;
+BATTEN_API batten_write_curves_options batten_write_curves_options_default(void);
+
+/* Curves [count], by extension:
+ *   .json       one: {"batten": "curve", "version": 1, "degree", "knots", "control_points", "periodic"}, several:
+ *               {"batten": "contours", "version": 1, "curves": [...]}, with "z": [...] where all planes are horizontal,
+ *               else, if there are planes, "planes": [{"origin", "axes"}]; reads back to the same bits
+ *   .step .stp  ISO 10303-21: a geometric curve set of B-spline curves with the same degree, knots and control points
+ *   .iges .igs  entities 126
+ *   .svg        paths of cubic Bezier pieces, exact to degree 3; of the plane coordinates
+ *   .vtu        Bezier curve cells of VTK 9, exact          .vtp .vtk  polylines
+ *   .csv        curve,t,x,y[,z],curvature: points within tolerance of the curve
+ * Fails: IO, INVALID (unknown extension: lists the known), TOO_LARGE, NOMEM, CANCELLED; what stood under the name is
+ * then as it was. */
+BATTEN_API batten_status batten_write_curves(batten_context *ctx, size_t count, const batten_curve *const *curves,
+                                             const batten_write_curves_options *opt, const char *path);
+
+typedef struct batten_curves {
+  size_t count;
+  batten_curve **curves; /* [count] */
+  batten_plane *planes;  /* [count] or NULL */
+} batten_curves;
+/* .json (also .gz) as batten_write_curves makes it. Checks everything and names the place. Free with
+ * batten_curves_free. Fails: IO, FORMAT, INVALID (unknown extension), NOMEM, TOO_LARGE; *out untouched then. */
+BATTEN_API batten_status batten_read_curves(batten_context *ctx, const char *path, batten_curves *out);
+BATTEN_API void batten_curves_free(batten_context *ctx, batten_curves *curves);
+
 /* ---- kinds of files ------------------------------------------------------------------------------ */
 
 /* What a file holds, by extension and content; only as much is read as that takes. Fails: IO, FORMAT. */
@@ -218,6 +280,7 @@ typedef enum batten_file_kind {
   BATTEN_FILE_QP,
   BATTEN_FILE_NETWORK,
   BATTEN_FILE_SURFACE,
+  BATTEN_FILE_CURVES, /* one or several */
   BATTEN_FILE_DOCUMENT /* another batten JSON document */
 } batten_file_kind;
 BATTEN_API batten_status batten_file_identify(batten_context *ctx, const char *path, batten_file_kind *out);

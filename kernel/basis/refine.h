@@ -1,0 +1,16 @@
+/* The same curve in a larger spline space: knot insertion and degree elevation in one, by blossoms. */
+#ifndef BATTEN_BASIS_REFINE_H
+#define BATTEN_BASIS_REFINE_H
+
+#include "bspline.h"
+
+/* points [from->count][dim] (dim 1 .. 3) -> out [to->count][dim]. `to` has the same domain, a degree >= that of from,
+ * and every knot of from at least as often plus the difference of degrees. Time O(to->count), times the number of
+ * subsets for elevation. Where nothing is elevated all combinations are convex. */
+void bspline_refine(const bspline *from, unsigned dim, const double *points, const bspline *to, double *out);
+
+/* The polygon's value of the blossom of span mu at arguments [degree]: out [dim]. */
+void bspline_blossom(const bspline *b, unsigned dim, const double *points, size_t mu, const double *arguments,
+                     double *out);
+
+#endif
