@@ -219,8 +219,8 @@ static bool no_option(cli_request *q, int key, const char *value) {
 }
 
 static int work(cli_request *q) {
-  static const char *const kinds[] = {"unknown",           "points",  "mesh",    "solid",   "carrier",
-                                      "quadratic program", "network", "surface", "document"};
+  static const char *const kinds[] = {"unknown",           "points",  "mesh",    "solid",  "carrier",
+                                      "quadratic program", "network", "surface", "curves", "document"};
   cli_run run;
   if (!cli_run_open(&run, q->threads, 0, q->quiet)) return CLI_FAILED;
   run.input = q->input;
@@ -258,6 +258,7 @@ static int work(cli_request *q) {
       case BATTEN_FILE_SURFACE:
         st = tell_surface(&run, q->input, print, &report);
         break;
+      case BATTEN_FILE_CURVES:
       case BATTEN_FILE_DOCUMENT:
         break;
       case BATTEN_FILE_UNKNOWN:

@@ -359,6 +359,45 @@ BATTEN_API batten_status batten_picture_panels(batten_context *ctx, unsigned row
 BATTEN_API batten_status batten_picture_outline(batten_context *ctx, const batten_outline *outline,
                                                 const batten_picture_options *opt, const char *path);
 
+/* What a layer of a plot in the plane draws. */
+typedef enum batten_plot_kind {
+  BATTEN_PLOT_LINE = 0, /* polylines */
+  BATTEN_PLOT_AREA,     /* the inside of closed polylines; holes are turned the other way */
+  BATTEN_PLOT_DOTS,     /* with a light rim */
+  BATTEN_PLOT_CROSSES,
+  BATTEN_PLOT_RINGS
+} batten_plot_kind;
+
+typedef struct batten_plot_layer {
+  batten_plot_kind kind;
+  size_t count; /* points, may be 0 */
+  const double *points; /* [count][2] */
+  size_t part_count;    /* polylines; 0 = one */
+  const size_t *starts; /* [part_count + 1] polyline i has points starts[i] .. starts[i + 1] - 1 */
+  int closed;           /* LINE: non-zero: from the last point back to the first */
+  unsigned color;       /* 0xrrggbb */
+  double width;         /* of lines; radius of marks: thousandths of the picture's shorter side, 0 .. 100; 0 = 2 (marks:
+                           5 at most, less when they are many) */
+  const char *label;    /* in the legend above the frame; NULL = none; ASCII */
+  int beyond;           /* non-zero: does not widen the range that is shown */
+} batten_plot_layer;
+
+typedef struct batten_plot {
+  size_t layer_count; /* 0: nothing is drawn there */
+  const batten_plot_layer *layers; /* later ones over earlier ones; cut at the frame */
+  int stretched;               /* non-zero: each axis has its own scale; 0: circles are round */
+  double lower[2], upper[2];   /* the range that is shown; equal = all that the layers have and a margin */
+  unsigned group;              /* plots with the same number show the same range; 0 = by itself */
+  const char *caption;         /* above the frame; NULL = none; ASCII */
+  const char *labels[2];       /* of the axes; NULL = none; ASCII */
+} batten_plot;
+
+/* Plots [rows][columns] in one picture: .png or .svg. Of opt its width, height and title count. Progress phase
+ * "picture". Fails: INVALID (names the plot and layer), NOMEM, TOO_LARGE, CANCELLED, IO. */
+BATTEN_API batten_status batten_picture_plots(batten_context *ctx, unsigned rows, unsigned columns,
+                                              const batten_plot *plots, const batten_picture_options *opt,
+                                              const char *path);
+
 #ifdef __cplusplus
 }
 #endif
