@@ -1,9 +1,8 @@
 /* Parameter correction: every point goes to a nearer place of the curve.   [Hoschek, Lasser 1993]
  *
  * A step is Newton's for half the squared distance; where that has no minimum Gauss and Newton's, or as long as the
- * curvature of the square says. It is halved until
- * the distance drops, or not made. It may lead into other spans; the ends of open curves hold points that are beyond
- * them, closed curves go round. */
+ * curvature of the square says. It is halved until the distance drops, or not made. It may lead into other spans; the
+ * ends of open curves hold points that are beyond them, closed curves go round. */
 #include "contour_inner.h"
 
 #include "base/checked.h"

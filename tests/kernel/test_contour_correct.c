@@ -2,7 +2,7 @@
 #include "contour/contour_inner.h"
 #include "tap.h"
 
-enum { KNOTS = 80, COUNT = 1000 };
+enum { KNOTS = 100, COUNT = 1000 };
 
 typedef struct rig {
   double knots[KNOTS], control[2 * KNOTS];
