@@ -111,6 +111,7 @@ void contour_space_expand(const contour_space *s, const double *y, double *contr
  * [j][k], k = 0 .. degree, of both coordinates alike. */
 typedef struct contour_objective {
   bspline b;
+  double *bend;  /* [b.count][degree + 1] integral of |x''|^2 */
   double *band;  /* [b.count][degree + 1] */
   double *right; /* [b.count][2] */
 } contour_objective;
