@@ -4,9 +4,14 @@
 
 #include "bspline.h"
 
+/* The combination (1 - part) a + part b, part in [0, 1]: a and b themselves at its ends, and where a = b. */
+static inline double bspline_blend(double a, double b, double part) {
+  return part <= 0.5 ? a + part * (b - a) : b - (1 - part) * (b - a);
+}
+
 /* points [from->count][dim] (dim 1 .. 3) -> out [to->count][dim]. `to` has the same domain, a degree >= that of from,
  * and every knot of from at least as often plus the difference of degrees. Time O(to->count), times the number of
- * subsets for elevation. Where nothing is elevated all combinations are convex. */
+ * subsets for elevation. All combinations are convex; control points that stay are copied to the bit. */
 void bspline_refine(const bspline *from, unsigned dim, const double *points, const bspline *to, double *out);
 
 /* The polygon's value of the blossom of span mu at arguments [degree]: out [dim]. */

@@ -2,45 +2,16 @@
 #include "surface_inner.h"
 
 #include "base/checked.h"
+#include "basis/check_knots.h"
 
 #include <string.h>
 
 static batten_status check_axis(batten_context *ctx, const batten_surface_form *form, int i, size_t *count) {
   unsigned d = form->degree[i];
-  if (d < 1 || d > BATTEN_SURFACE_DEGREE_MAX)
-    return batten_fail(ctx, BATTEN_E_INVALID, "degree[%d]: %u; give 1 to %d", i, d, BATTEN_SURFACE_DEGREE_MAX);
-  size_t n = form->knot_count[i];
-  const double *knots = form->knots[i];
-  if (n < 2 * (size_t)(d + 1))
-    return batten_fail(ctx, BATTEN_E_INVALID, "knot_count[%d]: %zu; degree %u needs %u knots at least", i, n, d,
-                       2 * (d + 1));
-  if (!knots) return batten_fail(ctx, BATTEN_E_INVALID, "knots[%d]: NULL; give %zu", i, n);
-  size_t bad = batten_first_nonfinite(n, knots);
-  if (bad < n) return batten_fail(ctx, BATTEN_E_INVALID, "knots[%d][%zu]: %g; give finite knots", i, bad, knots[bad]);
-  *count = n - d - 1;
-  for (size_t k = 0; k + 1 < n; k++)
-    if (knots[k] > knots[k + 1])
-      return batten_fail(ctx, BATTEN_E_INVALID, "knots[%d][%zu]: %.17g is below the knot before it; sort them", i,
-                         k + 1, knots[k + 1]);
-  if (knots[0] == knots[n - 1])
-    return batten_fail(ctx, BATTEN_E_INVALID, "knots[%d]: all are %.17g; give a domain of some length", i, knots[0]);
-  for (size_t k = 1; k < n; k++) {
-    bool end = k <= d || k > *count;
-    bool equal = knots[k] == knots[k - 1];
-    if (end && !equal)
-      return batten_fail(ctx, BATTEN_E_INVALID,
-                         "knots[%d][%zu]: %.17g; the first and the last %u knots of degree %u must be equal", i, k,
-                         knots[k], d + 1, d);
-    /* One inner knot at the upper end is one too many; those at the lower one repeat the first d + 1. */
-    if (!end && k >= d && (knots[k] == knots[k - d] || (k == *count && equal)))
-      return batten_fail(ctx, BATTEN_E_INVALID,
-                         "knots[%d][%zu]: %.17g repeats too often; inner knots may be there %u times", i, k, knots[k],
-                         d);
-  }
-  if (!isfinite(knots[n - 1] - knots[0]))
-    return batten_fail(ctx, BATTEN_E_INVALID, "knots[%d]: %g to %g; their distance is beyond a double", i, knots[0],
-                       knots[n - 1]);
-  return BATTEN_OK;
+  batten_status st = bspline_check_knots(ctx, i == 0 ? "[0]" : "[1]", d, BATTEN_SURFACE_DEGREE_MAX,
+                                         form->knot_count[i], form->knots[i]);
+  if (st >= 0) *count = form->knot_count[i] - d - 1;
+  return st;
 }
 
 /* The exponent that brings the size of the points' box to about 1; false when that size is beyond a double. */
