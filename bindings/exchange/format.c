@@ -1,6 +1,7 @@
 /* Formats by extension: see format.h. */
 #include "format.h"
 
+#include <math.h>
 #include <string.h>
 
 static bool equals(const char *text, size_t length, const char *lower_case) {
@@ -47,4 +48,14 @@ batten_status bx_check_pointers(batten_context *ctx, const char *path, const voi
   if (!*path) return batten_fail(ctx, BATTEN_E_INVALID, "path: empty; name a file");
   if (!out) return batten_fail(ctx, BATTEN_E_INVALID, "%s: NULL", out_name);
   return BATTEN_OK;
+}
+
+batten_status bx_check_density(batten_context *ctx, unsigned density, unsigned most) {
+  if (density >= 1 && density <= most) return BATTEN_OK;
+  return batten_fail(ctx, BATTEN_E_INVALID, "opt.density: %u; must be 1 .. %u", density, most);
+}
+
+batten_status bx_check_tolerance(batten_context *ctx, double tolerance) {
+  if (tolerance >= 0 && isfinite(tolerance)) return BATTEN_OK;
+  return batten_fail(ctx, BATTEN_E_INVALID, "opt.tolerance: %g; must be finite and not negative", tolerance);
 }

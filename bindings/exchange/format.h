@@ -30,6 +30,10 @@ bx_format bx_format_of(const char *path, bool *gz);
 /* Options, path and result pointer are there? INVALID otherwise. */
 batten_status bx_check_pointers(batten_context *ctx, const char *path, const void *out, const char *out_name);
 
+/* Fields that the options of several writers have: INVALID names them. */
+batten_status bx_check_density(batten_context *ctx, unsigned density, unsigned most);
+batten_status bx_check_tolerance(batten_context *ctx, double tolerance);
+
 /* The readers behind the public calls, on any stream: what tests and fuzzers feed. */
 batten_status bx_read_points_from(bx_reader *r, bx_format format, unsigned n, batten_cloud *out);
 batten_status bx_read_mesh_from(bx_reader *r, bx_format format, batten_mesh **out);

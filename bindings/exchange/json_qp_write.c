@@ -3,18 +3,6 @@
 
 #include <math.h>
 
-void bx_put_json_text(bx_writer *w, const char *text) {
-  bx_put_text(w, "\"");
-  for (const char *c = text; *c; c++) {
-    if (*c == '"' || *c == '\\') bx_put_u8(w, '\\');
-    if ((unsigned char)*c < 0x20)
-      bx_print(w, "\\u%04x", (unsigned)*c);
-    else
-      bx_put_u8(w, (uint8_t)*c);
-  }
-  bx_put_text(w, "\"");
-}
-
 /* null for what is infinite: no bound. */
 static void put_value(bx_writer *w, double value) {
   if (isfinite(value))

@@ -1,10 +1,22 @@
 /* Checked reading of JSON values: see json_read.h. */
 #include "json_read.h"
 
+#include "format.h"
+
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
+
+batten_status bx_open_document(bx_reader *r, batten_context *ctx, const char *path, const void *out,
+                               const char *what) {
+  bool gz;
+  batten_status st = bx_check_pointers(ctx, path, out, "out");
+  if (st == BATTEN_OK && bx_format_of(path, &gz) != BX_JSON)
+    st = batten_fail(ctx, BATTEN_E_INVALID, "%s: %s are read from .json .json.gz; convert the file",
+                     bx_short_path(path), what);
+  return st == BATTEN_OK ? bx_open(r, ctx, path) : st;
+}
 
 typedef struct source {
   bx_reader *r;
@@ -153,6 +165,16 @@ batten_status bx_get_whole(bx_json *j, const json_t *object, const char *key, in
   else
     st = bx_json_fail(j, "%g, where a whole number from %lld to %lld is expected", value, (long long)lower,
                       (long long)upper);
+  bx_leave(j, mark);
+  return st;
+}
+
+batten_status bx_get_flag(bx_json *j, const json_t *object, const char *key, bool *out) {
+  const json_t *value = json_object_get(object, key);
+  *out = json_is_true(value);
+  if (!value || json_is_boolean(value)) return BATTEN_OK;
+  size_t mark = bx_enter(j, key);
+  batten_status st = bx_json_fail(j, "%s, where true or false is expected", type_name(value));
   bx_leave(j, mark);
   return st;
 }

@@ -12,6 +12,10 @@ typedef struct bx_json {
   char place[192]; /* of the value in hand */
 } bx_json;
 
+/* Opens path, which must be .json, also .gz; what: "surfaces". INVALID for out = NULL and other extensions. */
+batten_status bx_open_document(bx_reader *r, batten_context *ctx, const char *path, const void *out,
+                               const char *what);
+
 /* Parses the whole stream; *out is released by json_decref. Jansson's memory is not the context's: it has one
  * allocator for the whole process, which belongs to the host. */
 batten_status bx_json_parse(bx_reader *r, json_t **out);
@@ -32,6 +36,8 @@ batten_status bx_get_text(bx_json *j, const json_t *object, const char *key, con
 batten_status bx_get_number(bx_json *j, const json_t *object, const char *key, double *out);
 batten_status bx_get_whole(bx_json *j, const json_t *object, const char *key, int64_t lower, int64_t upper,
                            int64_t *out);
+/* Whether it is true; it need not be there. */
+batten_status bx_get_flag(bx_json *j, const json_t *object, const char *key, bool *out);
 /* [count] numbers into out. */
 batten_status bx_get_numbers(bx_json *j, const json_t *object, const char *key, size_t count, double *out);
 /* [*rows][width] numbers in memory of the context; width 0: plain numbers, [*rows]. */

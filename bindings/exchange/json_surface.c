@@ -5,30 +5,17 @@
 #include "surface.h"
 #include "write.h"
 
-static void put_list(bx_writer *w, const double *values, size_t count) {
-  bx_put_u8(w, '[');
-  for (size_t i = 0; i < count; i++) {
-    if (i) bx_put_text(w, i % 8 ? ", " : ",\n");
-    bx_put_number(w, values[i]);
-  }
-  bx_put_u8(w, ']');
-}
-
 void bx_write_json_surface(bx_writer *w, const batten_surface_form *form) {
   size_t rows = bx_form_points(form, 0), columns = bx_form_points(form, 1);
   bx_print(w, "{\"batten\": \"surface\", \"version\": 1,\n\"degree\": [%u, %u],\n\"knots\": [\n", form->degree[0],
            form->degree[1]);
-  put_list(w, form->knots[0], form->knot_count[0]);
+  bx_put_json_numbers(w, form->knots[0], form->knot_count[0]);
   bx_put_text(w, ",\n");
-  put_list(w, form->knots[1], form->knot_count[1]);
+  bx_put_json_numbers(w, form->knots[1], form->knot_count[1]);
   bx_put_text(w, "],\n\"control_points\": [");
   for (size_t i = 0; i < rows && bx_goes_on(w, i, rows); i++) {
-    bx_put_text(w, i ? ",\n[" : "\n[");
-    for (size_t j = 0; j < columns; j++) {
-      if (j) bx_put_text(w, ", ");
-      put_list(w, form->control_points + 3 * (i * columns + j), 3);
-    }
-    bx_put_u8(w, ']');
+    bx_put_text(w, i ? ",\n" : "\n");
+    bx_put_json_rows(w, form->control_points + 3 * i * columns, columns, 3, ", ");
   }
   bx_put_text(w, "]\n}\n");
 }

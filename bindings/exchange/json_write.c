@@ -71,34 +71,21 @@ static batten_status check_carrier(batten_context *ctx, const batten_carrier *ca
 
 /* ---- writing ------------------------------------------------------------------------------------ */
 
-static void put_array(bx_writer *w, const double *values, size_t count) {
-  bx_put_text(w, "[");
-  for (size_t i = 0; i < count; i++) {
-    if (i) bx_put_text(w, ", ");
-    bx_put_number(w, values[i]);
-  }
-  bx_put_text(w, "]");
-}
-
 /* One row a line. */
 static void put_rows(bx_writer *w, const double *values, size_t rows, size_t width) {
-  bx_put_text(w, "[");
-  for (size_t i = 0; i < rows; i++) {
-    bx_put_text(w, i ? ",\n" : "\n");
-    put_array(w, values + i * width, width);
-  }
-  bx_put_text(w, "]");
+  bx_put_u8(w, '\n');
+  bx_put_json_rows(w, values, rows, width, ",\n");
 }
 
 static void put_spline(bx_writer *w, const batten_spline *spline) {
   batten_spline_parts p = {.struct_size = sizeof p};
   batten_spline_get_parts(spline, &p);
   bx_print(w, "{\n\"n\": %u, \"m\": %u,\n\"origin\": ", p.n, p.m);
-  put_array(w, p.origin, p.n);
+  bx_put_json_numbers(w, p.origin, p.n);
   bx_put_text(w, ", \"scale\": ");
   bx_put_number(w, p.scale);
   bx_put_text(w, ",\n\"polynomial\": ");
-  put_array(w, p.polynomial, p.polynomial_count);
+  bx_put_json_numbers(w, p.polynomial, p.polynomial_count);
   if (p.gradient_count) {
     bx_put_text(w, ",\n\"gradient_at\": [");
     for (size_t i = 0; i < p.gradient_count; i++) bx_print(w, i ? ", %zu" : "%zu", p.gradient_at[i]);
@@ -106,7 +93,7 @@ static void put_spline(bx_writer *w, const batten_spline *spline) {
     put_rows(w, p.gradient_coefficients, p.gradient_count, p.n);
   }
   bx_put_text(w, ",\n\"coefficients\": ");
-  put_array(w, p.coefficients, p.count);
+  bx_put_json_numbers(w, p.coefficients, p.count);
   bx_put_text(w, ",\n\"centers\": ");
   put_rows(w, p.centers, p.count, p.n);
   bx_put_text(w, "\n}");
@@ -128,14 +115,14 @@ static void put_carrier(bx_writer *w, const batten_carrier *carrier) {
         bx_put_number(w, *values++);
         break;
       case BX_VECTOR:
-        put_array(w, values, p.n);
+        bx_put_json_numbers(w, values, p.n);
         values += p.n;
         break;
       case BX_MATRIX:
         bx_put_text(w, "[");
         for (unsigned k = 0; k < p.n; k++, values += p.n) {
           if (k) bx_put_text(w, ", ");
-          put_array(w, values, p.n);
+          bx_put_json_numbers(w, values, p.n);
         }
         bx_put_text(w, "]");
     }
@@ -160,9 +147,9 @@ static void put_solid_members(bx_writer *w, const batten_solid *solid) {
   double lower[3], upper[3];
   batten_solid_box(solid, lower, upper);
   bx_print(w, "\"n\": %u, \"sign\": %d,\n\"lower\": ", n, batten_solid_sign(solid));
-  put_array(w, lower, n);
+  bx_put_json_numbers(w, lower, n);
   bx_put_text(w, ", \"upper\": ");
-  put_array(w, upper, n);
+  bx_put_json_numbers(w, upper, n);
   bx_put_text(w, ",\n\"carrier\": ");
   put_carrier(w, batten_solid_carrier(solid));
   bx_put_text(w, ",\n\"spline\": ");

@@ -88,12 +88,7 @@ batten_status bx_read_surface_from(bx_reader *r, batten_surface **out) {
 
 batten_status batten_read_surface(batten_context *ctx, const char *path, batten_surface **out) {
   bx_reader r;
-  bool gz;
-  batten_status st = bx_check_pointers(ctx, path, out, "out");
-  if (st == BATTEN_OK && bx_format_of(path, &gz) != BX_JSON)
-    st = batten_fail(ctx, BATTEN_E_INVALID, "%s: surfaces are read from .json .json.gz; convert the file",
-                     bx_short_path(path));
-  if (st == BATTEN_OK) st = bx_open(&r, ctx, path);
+  batten_status st = bx_open_document(&r, ctx, path, out, "surfaces");
   if (st != BATTEN_OK) return st;
   st = bx_read_surface_from(&r, out);
   bx_close(&r);

@@ -19,6 +19,9 @@ void bx_write_vtk(bx_writer *w, const batten_mesh *mesh);
 
 /* A text of JSON in its quotes; it is UTF-8. */
 void bx_put_json_text(bx_writer *w, const char *text);
+/* [1, 2, ...], eight a line; [[...], [...]] with what is between the rows: ", " or ",\n". Numbers are finite. */
+void bx_put_json_numbers(bx_writer *w, const double *values, size_t count);
+void bx_put_json_rows(bx_writer *w, const double *values, size_t rows, size_t width, const char *between);
 
 void bx_write_json_qp(bx_writer *w, const batten_qp_file *file);
 void bx_write_json_qp_solution(bx_writer *w, size_t n, size_t m, batten_status status,

@@ -3,8 +3,6 @@
 #include "network.h"
 #include "write.h"
 
-#include <math.h>
-
 #include "base/checked.h"
 
 batten_write_network_options batten_write_network_options_default(void) {
@@ -28,11 +26,8 @@ static batten_status check_options(batten_context *ctx, const batten_write_netwo
   bx_product product = product_of(o);
   st = bx_check_product(ctx, &product);
   if (st != BATTEN_OK) return st;
-  if (o->density < 1 || o->density > 512)
-    return batten_fail(ctx, BATTEN_E_INVALID, "opt.density: %u; must be 1 .. 512", o->density);
-  if (!(o->tolerance >= 0) || isinf(o->tolerance))
-    return batten_fail(ctx, BATTEN_E_INVALID, "opt.tolerance: %g; must be finite and not negative", o->tolerance);
-  return BATTEN_OK;
+  st = bx_check_density(ctx, o->density, 512);
+  return st == BATTEN_OK ? bx_check_tolerance(ctx, o->tolerance) : st;
 }
 
 static batten_status write_cad(batten_context *ctx, const batten_network *network,

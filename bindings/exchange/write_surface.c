@@ -3,8 +3,6 @@
 #include "surface.h"
 #include "write.h"
 
-#include <math.h>
-
 #include "base/checked.h"
 
 batten_write_surface_options batten_write_surface_options_default(void) {
@@ -24,11 +22,8 @@ static batten_status check_options(batten_context *ctx, const batten_write_surfa
   batten_status st = batten_check_struct(ctx, "batten_write_surface_options", o->struct_size, sizeof *o);
   if (st == BATTEN_OK) st = bx_check_product(ctx, &product);
   if (st != BATTEN_OK) return st;
-  if (o->density < 1 || o->density > 1024)
-    return batten_fail(ctx, BATTEN_E_INVALID, "opt.density: %u; must be 1 .. 1024", o->density);
-  if (!(o->tolerance >= 0) || isinf(o->tolerance))
-    return batten_fail(ctx, BATTEN_E_INVALID, "opt.tolerance: %g; must be finite and not negative", o->tolerance);
-  return BATTEN_OK;
+  st = bx_check_density(ctx, o->density, 1024);
+  return st == BATTEN_OK ? bx_check_tolerance(ctx, o->tolerance) : st;
 }
 
 /* A loop that passes a vertex where two sides have vanished has nothing that tells which of the parameters' corners
