@@ -43,5 +43,6 @@ batten_status bx_read_qp_from(bx_reader *r, bx_format format, batten_qp_file *ou
 batten_status bx_read_network_from(bx_reader *r, batten_network **out);
 batten_status bx_read_surface_from(bx_reader *r, batten_surface **out);
 batten_status bx_read_contours_from(bx_reader *r, batten_contours *out);
+batten_status bx_read_curves_from(bx_reader *r, batten_curves *out);
 
 #endif

@@ -35,6 +35,7 @@ static batten_file_kind kind_of_document(const unsigned char *bytes, size_t coun
   if (take_text(bytes, count, &at, "qp")) return BATTEN_FILE_QP;
   if (take_text(bytes, count, &at, "network")) return BATTEN_FILE_NETWORK;
   if (take_text(bytes, count, &at, "surface")) return BATTEN_FILE_SURFACE;
+  if (take_text(bytes, count, &at, "curve") || take_text(bytes, count, &at, "contours")) return BATTEN_FILE_CURVES;
   return BATTEN_FILE_DOCUMENT;
 }
 

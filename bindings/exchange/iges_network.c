@@ -33,7 +33,12 @@ static void put_surface(iges_network *n, unsigned degree) {
 static void put_curve(iges_file *f, unsigned degree, const double (*points)[3]) {
   double knots[2 * BX_DEGREE_MAX + 2];
   size_t count = bx_bezier_knots(degree, knots);
-  iges_put_curve(f, degree, count, knots, points[0]);
+  iges_put_curve(f, &(iges_curve){.degree = degree,
+                                  .knot_count = count,
+                                  .knots = knots,
+                                  .points = points[0],
+                                  .role = IGES_PART,
+                                  .label = ""});
 }
 
 static void put_line(iges_file *f, const double from[2], const double to[2]) {

@@ -91,14 +91,19 @@ void iges_put_surface(iges_file *f, const batten_surface_form *form, const bool 
   iges_end(f);
 }
 
-void iges_put_curve(iges_file *f, unsigned degree, size_t knot_count, const double *knots, const double *points) {
-  const size_t count = knot_count - degree - 1, head[] = {count - 1, degree, 0, 0, 1, 0};
-  iges_begin(f, 126, IGES_PART, "", 0);
+/* Upper index, degree; planar, closed, polynomial, not periodic; the ends of the parameters, the normal. */
+void iges_put_curve(iges_file *f, const iges_curve *c) {
+  static const double none[3] = {0};
+  const size_t count = c->knot_count - c->degree - 1;
+  const size_t head[] = {count - 1, c->degree, c->normal != NULL, c->closed, 1, 0};
+  iges_begin(f, 126, c->role, c->label, c->number);
   for (size_t i = 0; i < sizeof head / sizeof head[0]; i++) iges_put_whole(f, (unsigned long)head[i]);
-  iges_put_reals(f, knots, knot_count);
+  iges_put_reals(f, c->knots, c->knot_count);
   put_ones(f, count);
-  iges_put_reals(f, points, 3 * count);
-  iges_put_reals(f, (double[5]){knots[0], knots[knot_count - 1], 0, 0, 0}, 5);
+  iges_put_reals(f, c->points, 3 * count);
+  iges_put_real(f, c->knots[0]);
+  iges_put_real(f, c->knots[c->knot_count - 1]);
+  iges_put_reals(f, c->normal ? c->normal : none, 3);
   iges_end(f);
 }
 

@@ -5,6 +5,8 @@
 #include "cad.h"
 #include "write_file.h"
 
+#include <stdbool.h>
+
 enum { IGES_PARAMETER_COLUMNS = 64 };
 
 /* An entity's place among the others. */
@@ -40,8 +42,18 @@ void iges_put_reals(iges_file *f, const double *values, size_t count);
 void iges_end(iges_file *f);
 
 /* Entities 128 and 126, B-splines that are polynomial and not periodic. */
+typedef struct iges_curve {
+  unsigned degree;
+  size_t knot_count;
+  const double *knots, *points; /* [knot_count], [knot_count - degree - 1][3] */
+  bool closed;
+  const double *normal; /* [3] of the plane in which it lies; NULL: not said to lie in one */
+  iges_role role;
+  const char *label; /* as in iges_begin, with its number */
+  unsigned long number;
+} iges_curve;
 void iges_put_surface(iges_file *f, const batten_surface_form *form, const bool closed[2]);
-void iges_put_curve(iges_file *f, unsigned degree, size_t knot_count, const double *knots, const double *points);
+void iges_put_curve(iges_file *f, const iges_curve *curve);
 
 /* A whole file. put is called twice and has to give the same entities both times; size and reach are the diagonal of
  * the box of what is written, and its largest coordinate. */

@@ -1,5 +1,6 @@
 /* Outlines of plane solids as SVG, text, OBJ lines and VTK polylines. */
 #include "format.h"
+#include "svg.h"
 #include "vtk.h"
 
 #include <math.h>
@@ -22,18 +23,13 @@ static box bound(const batten_outline *outline) {
   return b;
 }
 
-/* One path with the solid filled and holes left open. The view box is the caller's unit; y points up, so the picture
- * is turned over by the transform and the numbers of the path stay those of the outline. */
+/* One path with the solid filled and holes left open. The view box is the caller's unit. */
 static void write_svg(bx_writer *w, const batten_outline *outline) {
   box b = bound(outline);
-  double width = b.upper[0] - b.lower[0], height = b.upper[1] - b.lower[1];
-  double size = fmax(width, height) > 0 ? fmax(width, height) : 1, margin = size / 20;
-  double view[4] = {b.lower[0] - margin, -b.upper[1] - margin, width + 2 * margin, height + 2 * margin};
-  bx_put_text(w, "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"");
-  bx_put_numbers(w, view, 4);
-  bx_put_text(w,
-              "\">\n  <path transform=\"scale(1 -1)\" fill=\"#c9d8e8\" fill-rule=\"evenodd\" stroke=\"#1f3a5f\" "
-              "stroke-width=\"");
+  double size = bx_svg_begin(w, b.lower, b.upper, NULL, 1);
+  bx_put_text(w, "  <path " BX_SVG_UPWARDS
+                 " fill=\"#c9d8e8\" fill-rule=\"evenodd\" stroke=\"#1f3a5f\" "
+                 "stroke-width=\"");
   bx_put_number(w, size / 400);
   bx_put_text(w, "\" stroke-linejoin=\"round\" d=\"");
   for (size_t i = 0; i < batten_outline_loop_count(outline); i++) {
@@ -46,7 +42,8 @@ static void write_svg(bx_writer *w, const batten_outline *outline) {
     }
     if (closed) bx_put_text(w, " Z");
   }
-  bx_put_text(w, "\"/>\n</svg>\n");
+  bx_put_text(w, "\"/>\n");
+  bx_svg_end(w);
 }
 
 /* Loops with a blank line between; a closed one ends with its first corner again. */

@@ -52,7 +52,7 @@ static uint64_t put_curve(step_file *s, unsigned degree, const double (*points)[
   ids[0] = from - 1;
   ids[degree] = to - 1;
   for (unsigned i = 1; i < degree; i++) ids[i] = step_put_point(&s->text, points[i]);
-  uint64_t curve = step_put_curve(&s->text, degree, count, knots, ids, false);
+  uint64_t curve = step_put_curve(&s->text, "", degree, count, knots, ids, false);
   return step_put_edge(&s->text, from, to, curve);
 }
 

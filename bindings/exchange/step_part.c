@@ -1,4 +1,4 @@
-/* Entities of STEP files that networks and surfaces have in common: see step_part.h. */
+/* Entities of STEP files that networks, surfaces and curves have in common: see step_part.h. */
 #include "step_part.h"
 
 void step_begin_file(step_text *s, const bx_product *product) {
@@ -42,10 +42,10 @@ static void put_different(step_text *s, size_t count, const double *knots) {
 
 static const char *logical(bool is) { return is ? ".T." : ".F."; }
 
-uint64_t step_put_curve(step_text *s, unsigned degree, size_t knot_count, const double *knots, const uint64_t *points,
-                        bool closed) {
+uint64_t step_put_curve(step_text *s, const char *name, unsigned degree, size_t knot_count, const double *knots,
+                        const uint64_t *points, bool closed) {
   uint64_t curve = step_begin(s);
-  bx_print(s->w, "B_SPLINE_CURVE_WITH_KNOTS('',%u,", degree);
+  bx_print(s->w, "B_SPLINE_CURVE_WITH_KNOTS('%s',%u,", name, degree);
   step_put_references(s, points, knot_count - degree - 1);
   bx_print(s->w, ",.UNSPECIFIED.,%s,.F.,", logical(closed));
   put_multiplicities(s, knot_count, knots);

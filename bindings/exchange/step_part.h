@@ -1,4 +1,5 @@
-/* Entities of STEP files that networks and surfaces have in common: B-splines, topology, the product around them.
+/* Entities of STEP files that networks, surfaces and curves have in common: B-splines, topology, the product around
+ * them.
  *
  *   step_begin_file(s, product); ... vertices, curves, edges, surfaces, faces, shells ...
  *   context = step_put_context(...); placement = step_put_placement(s);
@@ -24,9 +25,10 @@ void step_begin_file(step_text *s, const bx_product *product);
 uint64_t step_put_vertex_at(step_text *s, uint64_t point);
 uint64_t step_put_vertex(step_text *s, const double point[3]);
 
-/* B_SPLINE_CURVE_WITH_KNOTS through points that are written already, points [knot_count - degree - 1]. */
-uint64_t step_put_curve(step_text *s, unsigned degree, size_t knot_count, const double *knots, const uint64_t *points,
-                        bool closed);
+/* B_SPLINE_CURVE_WITH_KNOTS of that name (ASCII without quotes) through points that are written already, points
+ * [knot_count - degree - 1]. */
+uint64_t step_put_curve(step_text *s, const char *name, unsigned degree, size_t knot_count, const double *knots,
+                        const uint64_t *points, bool closed);
 /* EDGE_CURVE along a curve from its start to its end. */
 uint64_t step_put_edge(step_text *s, uint64_t from, uint64_t to, uint64_t curve);
 

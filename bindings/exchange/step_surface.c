@@ -27,7 +27,7 @@ static uint64_t put_side(step_surface *s, unsigned side) {
   unsigned from = side < 2 ? side : (side + 1) % BX_SIDES, to = side < 2 ? side + 1 : side;
   uint64_t start = corner_point(s, from), step = direction == 0 ? columns : 1;
   for (size_t i = 0; i < count; i++) s->line[i] = start + i * step;
-  uint64_t curve = step_put_curve(&s->text, s->form->degree[direction], s->form->knot_count[direction],
+  uint64_t curve = step_put_curve(&s->text, "", s->form->degree[direction], s->form->knot_count[direction],
                                   s->form->knots[direction], s->line, s->sides->corner[from] == s->sides->corner[to]);
   return step_put_edge(&s->text, s->vertices[from], s->vertices[to], curve);
 }

@@ -225,34 +225,43 @@ typedef struct batten_contours {
 
 /* Text (.txt .xyz .csv .tsv .asc .dat, also .gz), one contour or several:
  *   blocks of lines "x y" or "x y z" parted by blank lines; or each after a line "contour N" (N points follow); or with
- *   a line of names above the numbers, of which x y z t (parameter) w (weight) contour (its number or name; rows of one
- *   contour need not be neighbours) are taken.
- * Points with z lie in one plane for each contour, to 1e-6 of its size: where a coordinate is constant, the plane's axes
- * are the other two in the order x y, y z, x z; else those of the best plane. Free with batten_contours_free. Fails as batten_read_points. */
+ *   a line of names above the numbers, of which x y z, t or "parameter", w or "weight" and contour or "curve" (its number
+ *   or name; rows of one contour need not be neighbours) are taken.
+ * Numbers are taken as they are: whether contours are closed is for the caller to know, who may find the first point once
+ * more at the end. Points with z lie in one plane for each contour, to 1e-6 of its longest side. Where a coordinate is
+ * constant, in all contours if there is one, the plane's axes are the other two in the order x y, x z, y z, and the
+ * numbers stay; else it is the best plane, and its axes are these turned into it. Free with batten_contours_free. Fails as
+ * batten_read_points. */
 BATTEN_API batten_status batten_read_contours(batten_context *ctx, const char *path, batten_contours *out);
 BATTEN_API void batten_contours_free(batten_context *ctx, batten_contours *contours);
 
 typedef struct batten_write_curves_options {
   size_t struct_size;
   const batten_plane *planes; /* [count] where the curves lie; NULL = z = 0. Default NULL. */
-  batten_length_unit unit;    /* STEP, IGES. Default MM. */
+  batten_length_unit unit;    /* STEP, IGES, SVG: what the coordinates are in. Default MM. */
   batten_step_schema schema;  /* STEP. Default AP214. */
   const char *name;           /* STEP, IGES: of the product, UTF-8; NULL = the file's name without its extension */
   const char *time_stamp;     /* STEP, IGES: as in batten_write_network_options */
   double tolerance;           /* .svg of degree above 3, .csv, .vtk, .vtp: distance of what is written from the curve,
-                                 caller's unit; 0 = 1e-4 of the size. Default 0. */
+                                 caller's unit; 0 = 1e-4 of the largest curve's size. Default 0. */
 } batten_write_curves_options;
 BATTEN_API batten_write_curves_options batten_write_curves_options_default(void);
 
 /* Curves [count], by extension:
- *   .json       one: {"batten": "curve", "version": 1, "degree", "knots", "control_points", "periodic"}, several:
- *               {"batten": "contours", "version": 1, "curves": [...]}, with "z": [...] where all planes are horizontal,
- *               else, if there are planes, "planes": [{"origin", "axes"}]; reads back to the same bits
- *   .step .stp  ISO 10303-21: a geometric curve set of B-spline curves with the same degree, knots and control points
- *   .iges .igs  entities 126
- *   .svg        paths of cubic Bezier pieces, exact to degree 3; of the plane coordinates
- *   .vtu        Bezier curve cells of VTK 9, exact          .vtp .vtk  polylines
- *   .csv        curve,t,x,y[,z],curvature: points within tolerance of the curve
+ *   .json       one: {"batten": "curve", "version": 1, "degree", "periodic", "knots", "control_points"}, several:
+ *               {"batten": "contours", "version": 1, "curves": [{"degree", ...}, ...]}; a curve has "z" where its plane is
+ *               horizontal, else, if there are planes, "plane": {"origin", "axes"}. Reads back to the same bits
+ *   .step .stp  ISO 10303-21: a geometric curve set of B-spline curves with the same degree, knots and control points,
+ *               named "curve 0", "curve 1", ...
+ *   .iges .igs  entities 126, with their number and the normal of their plane
+ *   .svg        paths of Bezier pieces with the plane coordinates, y upwards, exact to degree 3; the width and height
+ *               are given in the unit
+ *   .vtu        Bezier curve cells of VTK 9, one a span, exact; cell data "domain" (the span's ends) and "curve"
+ *   .vtp .vtk   polylines within tolerance of the curves; point data "t" and "curvature", cell data "curve"
+ *   .csv        curve,t,x,y[,z],curvature: the same points, z where there are planes; curves are numbered from 0.
+ *               batten_read_contours reads them
+ * A closed curve ends with its first point again; there, as at knots where it jumps, the curvature is that of the side
+ * from which it is asked for in batten_curve_evaluate.
  * Fails: IO, INVALID (unknown extension: lists the known), TOO_LARGE, NOMEM, CANCELLED; what stood under the name is
  * then as it was. */
 BATTEN_API batten_status batten_write_curves(batten_context *ctx, size_t count, const batten_curve *const *curves,
