@@ -11,18 +11,12 @@
 
 #include <stdbool.h>
 
+#include "basis/rounding.h"
 #include "surface_inner.h"
 
 /* Highest degrees in one variable: of the surface m = 9; of L' .. N' 3 m - 1, D 6 m - 4, V = |x_u x x_v|^4 8 m - 4.
  */
 enum { CERTIFY_DEGREE = 8 * BATTEN_SURFACE_DEGREE_MAX - 4, CERTIFY_ORDER = CERTIFY_DEGREE + 1 };
-
-/* An operation's result is off by at most this times its size: twice what rounding to nearest does. */
-static const double CERTIFY_EPS = 0x1p-52;
-/* Above what all underflows of a sum together can lose; sizes are near 1. */
-static const double CERTIFY_TINY = 0x1p-900;
-/* What bounds of bounds are multiplied by, since these are rounded too. */
-static const double CERTIFY_UP = 1 + 0x1p-30;
 
 typedef struct certify_poly {
   unsigned degree[2];
