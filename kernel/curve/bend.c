@@ -1,8 +1,8 @@
 /* Derivatives of a span in Bernstein form, by Boehm's knot insertion, and their product.   [Boehm 1980]
  *
  * Every coefficient carries its own bound: on short spans beside long ones the coefficients' errors differ by
- * the ratio of their lengths. Differences of control points come first, as these were given: they are what the proof is
- * about, and lose nothing by points that are far from the origin. */
+ * the ratio of their lengths. Differences of control points come first, as these were given: they are what the proof
+ * is about, and lose nothing by points that are far from the origin. */
 #include "bend.h"
 
 #include <math.h>
@@ -162,8 +162,8 @@ void bend_make(const batten_curve *curve, size_t mu, double data_error, bend *ou
   if (d > 1) multiply(&second, out);
 }
 
-/* De Casteljau's algorithm at `to` on n + 1 rows of dim numbers with their errors; the arguments become the left part.
- * The first entry of a level is a coefficient of the left part, the last one of the right. `roundings`: of a
+/* De Casteljau's algorithm at `to` on n + 1 rows of dim numbers with their errors; the arguments become the left
+ * part. The first entry of a level is a coefficient of the left part, the last one of the right. `roundings`: of a
  * combination. */
 static void split_rows(unsigned n, unsigned dim, double to, double roundings, double *c, double *error, double *right,
                        double *right_error) {

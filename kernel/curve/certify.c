@@ -1,12 +1,12 @@
 /* The proof that a curve has the wanted curvature signs: spans, knots, inflections.
  *
- * Spans are cut at wanted inflections inside of them; each part, a stretch, is proven by itself (certify_prove.c). What
- * happens at the joints between them depends on what is known to be continuous there: at cuts and at knots that leave
- * x'' continuous a change of sign is a zero of [x', x''], which both sides enclose. At knots where x'' may jump both
- * sides are proven up to the knot; only where [x', x''] vanishes there to the rounding of the control points are they
- * proven like zeros, wrong signs below that rounding left aside. So it is at the ends of closed curves, where nothing
- * but the point is continuous to the bit. There and at corners the tangent may turn the right way, or not beyond
- * rounding. */
+ * Spans are cut at wanted inflections inside of them; each part, a stretch, is proven by itself (certify_prove.c).
+ * What happens at the joints between them depends on what is known to be continuous there: at cuts and at knots that
+ * leave x'' continuous a change of sign is a zero of [x', x''], which both sides enclose. At knots where x'' may jump
+ * both sides are proven up to the knot; only where [x', x''] vanishes there to the rounding of the control points are
+ * they proven like zeros, wrong signs below that rounding left aside. So it is at the ends of closed curves, where
+ * nothing but the point is continuous to the bit. There and at corners the tangent may turn the right way, or not
+ * beyond rounding. */
 #include "certify.h"
 
 #include <float.h>
@@ -75,11 +75,12 @@ static batten_status check(batten_context *ctx, const batten_curve *curve, const
   for (size_t i = 0; i < count; i++) {
     double t = opt->inflections[i];
     if (!(t >= lower && t < upper) || (t == lower && !curve->closed))
-      return batten_fail(ctx, BATTEN_E_INVALID, "opt.inflections[%zu]: %.17g; give one inside the domain, %.17g to %.17g",
-                         i, t, lower, upper);
+      return batten_fail(ctx, BATTEN_E_INVALID,
+                         "opt.inflections[%zu]: %.17g; give one inside the domain, %.17g to %.17g", i, t, lower,
+                         upper);
     if (i > 0 && !(opt->inflections[i - 1] < t))
-      return batten_fail(ctx, BATTEN_E_INVALID, "opt.inflections[%zu]: %.17g is not above the one before it; sort them",
-                         i, t);
+      return batten_fail(ctx, BATTEN_E_INVALID,
+                         "opt.inflections[%zu]: %.17g is not above the one before it; sort them", i, t);
   }
   return BATTEN_OK;
 }
@@ -99,7 +100,7 @@ static void prove(certifier *c, const extent *e, int side, double allowed) {
     s.from = e->to;
     s.to = e->from;
   }
-  certify_prove(&c->proof, &s);
+  curve_prove(&c->proof, &s);
 }
 
 /* What g may be off by at an end, and whether it is beyond that and right. */
@@ -279,8 +280,7 @@ batten_status batten_curve_certify(batten_context *ctx, const batten_curve *curv
   batten_status st = check(ctx, curve, opt, out);
   if (st < 0) return st;
   certifier c = {.curve = curve, .opt = opt, .data_error = bend_data_error(curve)};
-  c.proof = (certify_proof){
-      .depth_max = opt->depth_max, .least = INFINITY, .target = INFINITY, .bound = INFINITY};
+  c.proof = (certify_proof){.depth_max = opt->depth_max, .least = INFINITY, .target = INFINITY, .bound = INFINITY};
   c.proof.least_at = bspline_lower(&curve->space);
   c.proof.stack = batten_alloc_array(ctx, (size_t)opt->depth_max + 2, sizeof *c.proof.stack);
   if (!c.proof.stack) return BATTEN_E_NOMEM;

@@ -43,6 +43,6 @@ typedef struct certify_stretch {
 } certify_stretch;
 
 /* Proves it, or leaves proof->failed. Consumes the stretch. */
-void certify_prove(certify_proof *proof, certify_stretch *stretch);
+void curve_prove(certify_proof *proof, certify_stretch *stretch);
 
 #endif

@@ -11,10 +11,10 @@
  * continuous. Elsewhere (knots at which x'' may jump, the ends of closed curves) z is below what the rounding of the
  * control points has left open.
  *
- * The margin is that of curvature / rho = f / |x'|^3, f = g or q / share, |x'| from above by its coefficients. A piece
- * is done when its bound is within a tenth of the least that can be proven at places that were met, which falls while
- * the proof goes on: what was proven before holds all the more. Errors are taken off from both, so that bisection
- * always leads there. */
+ * The margin is that of curvature / rho = f / |x'|^3, f = g or q / share, |x'| from above by its coefficients. A
+ * piece is done when its bound is within a tenth of the least that can be proven at places that were met, which falls
+ * while the proof goes on: what was proven before holds all the more. Errors are taken off from both, so that
+ * bisection always leads there. */
 #include "certify.h"
 
 #include <math.h>
@@ -146,14 +146,15 @@ static bool divide_by_s(bend *b) {
   return true;
 }
 
-/* From f / |a|^3 to curvature / rho, not too large; an exponent beyond what products bear is cut, or tells nothing. */
+/* From f / |a|^3 to curvature / rho, not too large; an exponent beyond what products bear is cut, or tells nothing.
+ */
 static double factor_of(const certify_stretch *s) {
   int exponent = s->b.exponent > 900 ? 900 : s->b.exponent;
   double factor = exponent < -900 ? 0 : ldexp(1, exponent);
   return s->zero ? factor / s->share / CERTIFY_UP : factor;
 }
 
-void certify_prove(certify_proof *proof, certify_stretch *stretch) {
+void curve_prove(certify_proof *proof, certify_stretch *stretch) {
   task t = {.proof = proof, .stretch = stretch, .factor = factor_of(stretch), .patience = proof->pieces + PATIENCE};
   certify_piece *whole = &proof->stack[0];
   *whole = (certify_piece){.b = stretch->b, .width = 1};

@@ -123,30 +123,37 @@ BATTEN_API batten_status batten_curve_inflections(batten_context *ctx, const bat
 
 /* With [a, b] = a_1 b_2 - a_2 b_1 the curvature is [x', x''] / |x'|^3. On each span, subdivided as need be, the
  * Bernstein coefficients of [x', x''] must have the wanted sign by more than all rounding errors together: then the
- * curvature has that sign and x' vanishes nowhere. Near an inflection at which x'' vanishes, [x', x'''] (the
- * derivative of [x', x'']) must have one sign on both sides: then there is exactly one zero. At knots that are there
- * degree times the tangent must turn by less than pi to the side to which the curve bends there, or not at all to
- * rounding. Knows nothing of how the curve was made. */
+ * curvature has that sign and x' vanishes nowhere. At an inflection t_w where x'' is continuous (inside a span, or at
+ * a knot that is there degree - 2 times or less) the same is shown of ([x', x''](t) - [x', x''](t_w)) / (t - t_w) on
+ * the spans next to it, and near it that its product with t - t_w, hence [x', x''], is monotone on either side: then
+ * there is exactly one zero. At knots that are there degree - 1 times, corners, and the ends of closed curves, x''
+ * may jump: signs are proven up to them, but wrong ones that the rounding of the control points explains do not count
+ * at a wanted inflection. At corners (knots that are there degree times) the tangent must turn by less than pi to the
+ * side to which the curve bends there, or not at all to that rounding; so at the ends of closed curves. Knows nothing
+ * of how the curve was made. Curves of degree 1 do not bend and are never certified. About 1 us a span of degree 3.
+ */
 typedef struct batten_curve_shape_options {
   size_t struct_size;
   int sign;                  /* of the curvature at the start, +1 or -1; 0: whichever it is. Default 0. */
   size_t inflection_count;   /* changes of sign that are wanted, no others. Default 0. */
   const double *inflections; /* [inflection_count] ascending, inside the domain; of closed curves the start may be one
                                 and their number is even */
-  double slack;       /* > 0: how far from its parameter an inflection may lie, as a part of the spans next to it.
-                         Default 1e-9. */
+  double slack;       /* > 0: how far from its parameter an inflection may lie, as a part of the spans next to it,
+                         besides what the rounding of the control points may move it by (up to a quarter of a span:
+                         on short spans that is what decides). Default 1e-9. */
   unsigned depth_max; /* bisections of a span, 0 .. 50. Default 40. */
 } batten_curve_shape_options;
 BATTEN_API batten_curve_shape_options batten_curve_shape_options_default(void);
 
 typedef struct batten_curve_shape {
-  int certified;     /* non-zero: proven: the wanted signs, exactly the wanted inflections, x' nowhere 0 */
-  int sign;          /* at the start when certified, else 0 */
-  double margin_min; /* With sigma the wanted sign and rho(t) = 1, but next to an inflection at which the curvature
-                        is continuous |t - inflection| / length of the span there: sigma curvature(t) >= margin_min
-                        rho(t) is proven (beyond inflection_error), 1 / unit, and at least nine tenths of the least
-                        there is. When not certified: the least that was met */
-  double worst_at;   /* where the least was met */
+  int certified;           /* non-zero: proven: the wanted signs, exactly the wanted inflections, x' nowhere 0 */
+  int sign;                /* at the start when certified, else 0 */
+  double margin_min;       /* With sigma the wanted sign and rho(t) = 1, but on a span with an inflection at which the
+                              curvature vanishes (|t - inflection| - inflection_error) / length of the span, of the nearest
+                              one: sigma curvature(t) >= margin_min rho(t) is proven, 1 / unit, and margin_min is at least
+                              nine tenths of the largest such number, as far as rounding lets that be proven. When not
+                              certified: the least that was met; 0 at corners that turn the wrong way */
+  double worst_at;         /* where the least was met */
   double inflection_error; /* proven: so near to the wanted parameters the inflections lie, in parameters */
   size_t pieces;           /* that were looked at */
   unsigned depth;          /* bisections of the smallest */
