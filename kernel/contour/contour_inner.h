@@ -2,7 +2,10 @@
  *
  * parameters.c   batten_contour_parametrize
  * smooth.c       the smoothing spline of data, and the noise that it tells
- * propose.c      runs of curvature in it, and which of them count
+ * forced.c       the same with given signs of curvature
+ * plot.c         curvature along it, and how sure it is
+ * bends.c        runs of one sign in the plot, and which of them count
+ * propose.c      what is asked for of these
  * knots.c        where breaks are placed, and how many
  * space.c        curves that satisfy the equalities: the unknowns
  * objective.c    sum of squares and tension in banded form; their minimum

@@ -1,0 +1,412 @@
+/* Which runs of the curvature plot count.
+ *
+ * Between the zeros of the smoothed data's curvature lie runs of one sign. What speaks for a run is by how much the
+ * fit worsens without it: the smoothing spline is fitted again with the run's sign turned into that of its
+ * neighbours (forced.c). The rise of the sum, in squares of the noise, is about chi-squared where the run is but
+ * noise; its root is the run's significance, in standard deviations. The least significant run joins its neighbours,
+ * until all that are left are significant [backward elimination]. So straight pieces, the ringing of a smooth curve
+ * beside a corner, and wiggles do not count, and a weak but long bend does.
+ *
+ * Runs that noise explains many times over join first, without fits: where curvature is less than its standard
+ * deviation. An inflection lies in the middle of where the curvature's sign is uncertain (within two standard
+ * deviations of 0): in a straight piece that is its middle. */
+#include "bends.h"
+
+#include <string.h>
+
+#include "base/checked.h"
+#include "forced.h"
+
+/* Curvature that is so small a part of its standard deviation has no sign. */
+static const double NO_SIGN = 1e-3;
+/* The sign of curvature is certain from here on, in its standard deviations. */
+static const double CERTAIN = 2;
+/* Runs whose curvature squared, in variances and summed over bandwidths, is less than this join without a fit. */
+static const double NOISE_ALONE = 1;
+/* Between two inflections, and beyond the last one, lie so many points, or nothing speaks for a run. */
+enum { POINTS_MIN = 2 };
+enum { BISECTIONS = 40 };
+
+/* Runs that are joined: a part of a ring or chain of all that are left. */
+typedef struct group {
+  size_t before, after; /* neighbours; NONE at open ends */
+  double from, to;
+  size_t peak; /* sample of greatest curvature of its sign, in standard deviations */
+  int sign;
+  double energy;       /* of its sign, less that of joined runs of the other sign */
+  double significance; /* NaN: not known */
+  bool joined;         /* to another one: no more there */
+} group;
+static const size_t NONE = (size_t)-1;
+
+typedef struct search {
+  const contour_smooth *smooth;
+  const contour_plot *plot;
+  size_t points;
+  const double *parameters;
+  size_t count, left; /* of runs; of groups that are not joined */
+  batten_contour_run *runs;
+  group *groups; /* [count] */
+  contour_forced forced;
+  double noise;
+} search;
+
+static double value(const search *s, size_t sample) {
+  const double *at = s->plot->samples + 4 * sample;
+  return at[2] > 0 ? at[1] / at[2] : 0;
+}
+
+static int sign_of(const search *s, size_t sample) {
+  double z = value(s, sample);
+  return fabs(z) <= NO_SIGN ? 0 : z > 0 ? 1 : -1;
+}
+
+static double bend_at(const search *s, double t) {
+  double jet[3][2];
+  contour_smooth_jet(s->smooth, s->smooth->control, t, jet);
+  return contour_cross(jet[1], jet[2]);
+}
+
+/* Where the curvature leaves a sign between two parameters. */
+static double find_zero(const search *s, double from, double to, int sign) {
+  for (int i = 0; i < BISECTIONS; i++) {
+    double middle = 0.5 * (from + to);
+    if (bend_at(s, middle) * sign > 0)
+      from = middle;
+    else
+      to = middle;
+  }
+  return 0.5 * (from + to);
+}
+
+/* The tangent's angle; beyond the end of closed curves it goes on. */
+static double angle_at(const search *s, double t) {
+  double add = 0, steps = (double)(s->plot->count - 1);
+  if (t > 1) {
+    t -= 1;
+    add = s->plot->angles[s->plot->count - 1] - s->plot->angles[0];
+  }
+  double at = t * steps;
+  size_t i = at < steps ? (size_t)at : s->plot->count - 2;
+  return add + s->plot->angles[i] + (at - (double)i) * (s->plot->angles[i + 1] - s->plot->angles[i]);
+}
+
+/* Changes of sign in the plot: how many, and where (changes NULL: only how many). *first: the sign before. */
+static size_t find_changes(const search *s, double *changes, int *first) {
+  size_t count = 0, last = 0;
+  int before = 0;
+  for (size_t i = 0; i < s->plot->count; i++) {
+    int sign = sign_of(s, i);
+    if (!sign) continue;
+    if (before && sign != before) {
+      if (changes) changes[count] = find_zero(s, s->plot->samples[4 * last], s->plot->samples[4 * i], before);
+      count++;
+    }
+    if (!before) *first = sign;
+    before = sign;
+    last = i;
+  }
+  if (!before) *first = 1;
+  return count;
+}
+
+/* Sums over samples of a run, and its peak. */
+static void measure_run(search *s, size_t i) {
+  const batten_contour_run *r = &s->runs[i];
+  group *g = &s->groups[i];
+  size_t steps = s->plot->count - 1;
+  double part = 1 / ((double)steps * s->smooth->bandwidth), best = -1;
+  size_t from = (size_t)ceil(r->from * (double)steps), to = (size_t)floor(r->to * (double)steps);
+  g->peak = (size_t)(0.5 * (r->from + r->to) * (double)steps) % steps;
+  for (size_t k = from; k <= to; k++) {
+    size_t sample = k > steps ? k - steps : k;
+    double z = value(s, sample) * r->sign;
+    if (z < 0) continue;
+    g->energy += part * z * z;
+    if (z > best) {
+      best = z;
+      g->peak = sample;
+    }
+  }
+}
+
+static batten_status find_runs(batten_context *ctx, search *s) {
+  int first = 1;
+  bool closed = s->smooth->closed;
+  size_t changes = find_changes(s, NULL, &first);
+  /* Rounding may let the ends of a closed plot differ. */
+  if (closed) changes -= changes % 2;
+  s->count = s->left = closed && changes ? changes : changes + 1;
+  double *at = batten_alloc_array(ctx, changes + 2, sizeof *at);
+  s->runs = at ? batten_alloc_array(ctx, s->count, sizeof *s->runs) : NULL;
+  s->groups = s->runs ? batten_alloc_array(ctx, s->count, sizeof *s->groups) : NULL;
+  if (!s->groups) {
+    batten_free(ctx, at);
+    return BATTEN_E_NOMEM;
+  }
+  find_changes(s, at, &first);
+  for (size_t i = 0; i < s->count; i++) {
+    batten_contour_run r = {.from = 0, .to = 1, .sign = i % 2 ? -first : first};
+    if (closed && changes) {
+      r.sign = -r.sign;
+      r.from = at[i];
+      r.to = i + 1 < changes ? at[i + 1] : at[0] + 1;
+    } else {
+      if (i > 0) r.from = at[i - 1];
+      if (i < changes) r.to = at[i];
+    }
+    r.turn = angle_at(s, r.to) - angle_at(s, r.from);
+    s->runs[i] = r;
+    s->groups[i] = (group){.before = i ? i - 1 : NONE,
+                           .after = i + 1 < s->count ? i + 1 : NONE,
+                           .from = r.from,
+                           .to = r.to,
+                           .sign = r.sign,
+                           .significance = NAN};
+    measure_run(s, i);
+  }
+  if (closed && changes) {
+    s->groups[0].before = s->count - 1;
+    s->groups[s->count - 1].after = 0;
+  }
+  batten_free(ctx, at);
+  return BATTEN_OK;
+}
+
+/* Group i joins its neighbours: of three one remains, the one before if there is one. */
+static size_t join(search *s, size_t i) {
+  group *g = s->groups;
+  size_t before = g[i].before, after = g[i].after, to = before != NONE ? before : after;
+  group *keep = &g[to];
+  g[i].joined = true;
+  keep->energy = fmax(keep->energy - g[i].energy, 0);
+  s->left--;
+  if (before == NONE) {
+    keep->from = g[i].from;
+    keep->before = NONE;
+  } else if (after == NONE) {
+    keep->to = g[i].to;
+    keep->after = NONE;
+  } else if (before == after) { /* two on a ring */
+    keep->before = keep->after = NONE;
+    keep->from = 0;
+    keep->to = 1;
+  } else {
+    group *other = &g[after];
+    other->joined = true;
+    s->left--;
+    keep->to = other->to > keep->from ? other->to : other->to + 1;
+    keep->after = other->after;
+    keep->energy += other->energy;
+    if (fabs(value(s, other->peak)) > fabs(value(s, keep->peak))) keep->peak = other->peak;
+    if (keep->after != NONE) g[keep->after].before = to;
+    /* A ring of four becomes one of two. */
+  }
+  return to;
+}
+
+/* The first group that is left. */
+static size_t first_group(const search *s) {
+  size_t i = 0;
+  while (s->groups[i].joined) i++;
+  return i;
+}
+
+static void join_noise(search *s) {
+  while (s->left > 1) {
+    size_t least = NONE;
+    for (size_t i = 0; i < s->count; i++)
+      if (!s->groups[i].joined && (least == NONE || s->groups[i].energy < s->groups[least].energy)) least = i;
+    if (s->groups[least].energy >= NOISE_ALONE) return;
+    join(s, least);
+  }
+}
+
+/* How far from a change at t, one way (step +1, -1), the sign is uncertain: walks the plot to where curvature of the
+ * sign there is certain, at most to the group's peak. Beyond 1 and below 0 on closed curves. */
+static double uncertain_until(const search *s, double t, int step, const group *g) {
+  const size_t steps = s->plot->count - 1;
+  double at = t * (double)steps, z_before = 0, where = at;
+  double next = step > 0 ? floor(at) + 1 : ceil(at) - 1;
+  for (size_t k = 0; k <= steps; k++, next += step) {
+    if (!s->smooth->closed && (next < 0 || next > (double)steps)) break;
+    double folded = next - floor(next / (double)steps) * (double)steps;
+    size_t sample = s->smooth->closed ? (size_t)folded : (size_t)next;
+    double z = value(s, sample) * g->sign;
+    if (z >= CERTAIN) {
+      double part = z > z_before ? (CERTAIN - z_before) / (z - z_before) : 1;
+      return (where + fmin(fmax(part, 0), 1) * (next - where)) / (double)steps;
+    }
+    where = next;
+    z_before = z;
+    if (sample == g->peak) break;
+  }
+  return where / (double)steps;
+}
+
+/* Sites between two parameters (to may be beyond 1) may bend one way. */
+static void set_ways(search *s, double from, double to, int way) {
+  const size_t count = s->forced.count;
+  for (size_t k = (size_t)fmax(floor(from * (double)count), 0); k < 2 * count; k++) {
+    double t = ((double)k + 0.5) / (double)count;
+    if (t > to || (k >= count && !s->smooth->closed)) break;
+    if (t >= from) s->forced.sites[k % count].way = (signed char)way;
+  }
+}
+
+/* The least sum with the groups' signs, without group `without`. */
+static double cost(search *s, size_t without) {
+  const group *g = s->groups;
+  size_t i = first_group(s), first = i;
+  if (s->left == 1) {
+    set_ways(s, 0, 1, without == i ? -g[i].sign : g[i].sign);
+    return contour_forced_solve(&s->forced, NULL);
+  }
+  do {
+    set_ways(s, g[i].from, g[i].to, i == without ? -g[i].sign : g[i].sign);
+    i = g[i].after;
+  } while (i != NONE && i != first);
+  i = first;
+  do { /* between groups of different sign the change may move */
+    size_t next = g[i].after;
+    if (next == NONE) break;
+    if (i != without && next != without) {
+      double from = uncertain_until(s, g[next].from, -1, &g[i]), to = uncertain_until(s, g[next].from, 1, &g[next]);
+      set_ways(s, from < 0 ? from + 1 : from, from < 0 ? to + 1 : to, 0);
+    }
+    i = next;
+  } while (i != first);
+  return contour_forced_solve(&s->forced, NULL);
+}
+
+/* Points with parameters in [from, to], to maybe beyond 1. */
+static size_t count_points(const search *s, double from, double to) {
+  size_t count = 0;
+  for (size_t i = 0; i < s->points && count < POINTS_MIN; i++) {
+    double t = s->parameters[i];
+    count += (t >= from && t <= to) || t + 1 <= to;
+  }
+  return count;
+}
+
+static batten_status find_significances(batten_context *ctx, search *s) {
+  double least = NAN;
+  for (size_t i = 0; i < s->count; i++) {
+    group *g = &s->groups[i];
+    if (g->joined || !isnan(g->significance)) continue;
+    batten_status st = batten_progress(ctx, "inflections", 0.5);
+    if (st < 0) return st;
+    if (isnan(least)) least = cost(s, NONE);
+    double rise = cost(s, i) - least;
+    g->significance = rise > 0 ? sqrt(rise) / s->noise : 0;
+    if (s->left > 1 && count_points(s, g->from, g->to) < POINTS_MIN) g->significance = 0;
+  }
+  return BATTEN_OK;
+}
+
+static bool inside(const batten_contour_run *r, const group *g) {
+  double middle = 0.5 * (r->from + r->to);
+  if (middle >= 1) middle -= 1;
+  return r->sign == g->sign && ((middle >= g->from && middle <= g->to) || middle + 1 <= g->to);
+}
+
+/* What is known of a group, its runs have. */
+static void note(search *s, const group *g, int kept) {
+  for (size_t k = 0; k < s->count; k++) {
+    if (!inside(&s->runs[k], g)) continue;
+    s->runs[k].significance = g->significance;
+    s->runs[k].kept = kept;
+  }
+}
+
+static batten_status join_insignificant(batten_context *ctx, search *s, double significance) {
+  for (;;) {
+    batten_status st = find_significances(ctx, s);
+    if (st < 0) return st;
+    size_t least = NONE;
+    for (size_t i = 0; i < s->count; i++)
+      if (!s->groups[i].joined && (least == NONE || s->groups[i].significance < s->groups[least].significance))
+        least = i;
+    if (s->left == 1 || s->groups[least].significance >= significance) return BATTEN_OK;
+    note(s, &s->groups[least], 0);
+    group *joined = &s->groups[join(s, least)];
+    joined->significance = NAN;
+    if (joined->before != NONE) s->groups[joined->before].significance = NAN;
+    if (joined->after != NONE) s->groups[joined->after].significance = NAN;
+  }
+}
+
+/* Ascending; of a ring the last change may have gone round. */
+static void sort_changes(contour_bends *b) {
+  for (size_t i = 1; i < b->count; i++)
+    for (size_t k = i; k > 0 && b->inflections[k] < b->inflections[k - 1]; k--) {
+      double t = b->inflections[k], u = b->uncertainties[k];
+      b->inflections[k] = b->inflections[k - 1];
+      b->uncertainties[k] = b->uncertainties[k - 1];
+      b->inflections[k - 1] = t;
+      b->uncertainties[k - 1] = u;
+    }
+}
+
+/* Inflections in the middle of where the sign is uncertain; runs that count. */
+static void conclude(search *s, contour_bends *b) {
+  const group *g = s->groups;
+  size_t i = first_group(s), first = i;
+  double least = INFINITY; /* of the inflections: the sign before it is that at the start */
+  b->sign = g[first].sign;
+  do {
+    size_t next = g[i].after;
+    note(s, &g[i], 1);
+    if (next == NONE) break;
+    double from = uncertain_until(s, g[next].from, -1, &g[i]), to = uncertain_until(s, g[next].from, 1, &g[next]);
+    double t = 0.5 * (from + to);
+    if (s->smooth->closed) t -= floor(t);
+    if (t < least) {
+      least = t;
+      b->sign = t > 0 ? g[i].sign : g[next].sign;
+    }
+    b->inflections[b->count] = t;
+    b->uncertainties[b->count++] = 0.5 * (to - from) / CERTAIN;
+    i = next;
+  } while (i != first);
+  sort_changes(b);
+}
+
+void contour_bends_free(batten_context *ctx, contour_bends *b) {
+  if (!b) return;
+  batten_free(ctx, b->uncertainties);
+  batten_free(ctx, b->inflections);
+  batten_free(ctx, b->runs);
+  *b = (contour_bends){0};
+}
+
+batten_status contour_bends_find(batten_context *ctx, const contour_smooth *smooth, const contour_plot *plot,
+                                 size_t points, const double *parameters, double significance, contour_bends *out) {
+  search s = {.smooth = smooth, .plot = plot, .points = points, .parameters = parameters};
+  contour_bends b = {0};
+  s.noise = fmax(smooth->noise, CONTOUR_EVEN);
+  batten_status st = find_runs(ctx, &s);
+  if (st >= 0) {
+    join_noise(&s);
+    st = contour_forced_new(ctx, smooth, &s.forced);
+  }
+  if (st >= 0) st = join_insignificant(ctx, &s, significance);
+  if (st >= 0 && s.left > 1) {
+    b.inflections = batten_alloc_array(ctx, s.left, sizeof *b.inflections);
+    b.uncertainties = b.inflections ? batten_alloc_array(ctx, s.left, sizeof *b.uncertainties) : NULL;
+    if (!b.uncertainties) st = BATTEN_E_NOMEM;
+  }
+  if (st >= 0) {
+    conclude(&s, &b);
+    b.run_count = s.count;
+    b.runs = s.runs;
+    s.runs = NULL;
+    *out = b;
+    b = (contour_bends){0};
+  }
+  contour_bends_free(ctx, &b);
+  contour_forced_free(ctx, &s.forced);
+  batten_free(ctx, s.groups);
+  batten_free(ctx, s.runs);
+  return st;
+}
