@@ -7,6 +7,7 @@
  * bends.c        runs of one sign in the plot, and which of them count
  * propose.c      what is asked for of these
  * knots.c        where breaks are placed, and how many
+ * layout.c       breaks, inflections and signs of pieces
  * space.c        curves that satisfy the equalities: the unknowns
  * objective.c    sum of squares and tension in banded form; their minimum
  * reference*.c   a curve of the wanted shape near the data [section 2.2 (i)]
@@ -15,7 +16,8 @@
  * program.c      the quadratic program of a round [section 2.2 (iii)]
  * correct.c      parameter correction
  * judge.c        noise, or data of another shape
- * options.c      defaults, ranges, data that make no sense
+ * options.c      defaults and ranges
+ * input.c        data that make no sense; scales
  * fit.c          batten_contour_fit: scales, rounds, certificate
  *
  * In all of it points are scaled to a box of size about 1 around 0 (by a power of two), parameters and breaks are in
@@ -62,6 +64,27 @@ typedef struct contour_ends {
   double point[2][2];
   double tangent[2][2]; /* unit */
 } contour_ends;
+
+/* ---- options.c, input.c -------------------------------------------------------------------------- */
+
+/* Fails: INVALID, as the header says of each option; breaks and inflections are checked with the data. */
+batten_status contour_options_check(batten_context *ctx, const batten_contour_options *opt);
+batten_status contour_breaks_check(batten_context *ctx, const batten_contour_options *opt, const double domain[2]);
+
+/* Points [count][2] in a box of size about 1, parameters in [0, 1], weights up to about 1. */
+typedef struct contour_input {
+  size_t count;
+  bool repeated;                         /* the first point came again at the end, and was left out */
+  double *points, *weights, *parameters; /* batten's; weights NULL = ones */
+  double middle[2], unit;                /* points = (the caller's - middle) * unit */
+  double weight_unit, total;             /* weights = the caller's * weight_unit; their sum */
+  double domain[2];                      /* parameters = (the caller's - domain[0]) / (domain[1] - domain[0]) */
+} contour_input;
+/* Checks data, breaks and inflections, scales, and estimates parameters that are not given. opt has been checked.
+ * Fails: INVALID, NOMEM, TOO_LARGE. */
+batten_status contour_input_make(batten_context *ctx, size_t count, const double *points,
+                                 const batten_contour_options *opt, contour_input *out);
+void contour_input_free(batten_context *ctx, contour_input *in);
 
 /* ---- parameters.c, knots.c, correct.c ------------------------------------------------------------ */
 
