@@ -231,8 +231,8 @@ static inline double contour_table_turn(const double *table, size_t i, bool clos
   if (i == 0) a = table + 2 * (CONTOUR_TABLE - 1);
   if (i == 0 && !closed) return 0;
   double u[2] = {b[0] - a[0], b[1] - a[1]}, v[2] = {c[0] - b[0], c[1] - b[1]};
-  double turn = (u[0] * v[1] - u[1] * v[0]) / (hypot(u[0], u[1]) * hypot(v[0], v[1]));
-  return fabs(turn) < 1e-9 ? 0 : turn;
+  double hu = hypot(u[0], u[1]), hv = hypot(v[0], v[1]), turn = (u[0] * v[1] - u[1] * v[0]) / (hu * hv);
+  return fabs(turn) < 1e-9 + 1e-14 / fmin(hu, hv) ? 0 : turn;
 }
 
 /* Changes of sign of the turns; a straight piece between counts in its middle. */

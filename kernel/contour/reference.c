@@ -1,0 +1,128 @@
+/* The reference curve: of the wanted shape, near the data.   [Juettler: contour data, section 2.2 (i)]
+ *
+ * Its degree is smoothness + 1, its breaks are those of the fit or some of them, and it is then written in the space
+ * of the fit. Construction 2, least squares on fewer knots, is nearer to the data and tried first; construction 1,
+ * prescribed directions of legs, always has the wanted signs. What counts in the end is whether linear inequalities
+ * can enclose the curve: contour_rows_make is asked.
+ *
+ * A cubic span with inflections at both ends is straight, for its x'' is linear. There references have degree 4,
+ * which the space of the fit must have. The paper does not speak of it. */
+#include "reference_inner.h"
+
+#include "basis/refine.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { SAMPLES = 8 };
+
+/* Bernstein coefficients -> the value at s, destroys them. */
+static void casteljau(unsigned degree, double s, double (*c)[2], double value[2]) {
+  for (unsigned r = degree; r > 0; r--)
+    for (unsigned i = 0; i < r; i++)
+      for (int k = 0; k < 2; k++) c[i][k] = (1 - s) * c[i][k] + s * c[i + 1][k];
+  memcpy(value, c[0], 2 * sizeof *value);
+}
+
+/* Bernstein coefficients of the k-th derivative on span mu. */
+static void derivative(const bspline *b, const double *control, size_t mu, unsigned k, double (*out)[2]) {
+  double rows[BSPLINE_ORDER * BSPLINE_ORDER];
+  unsigned order = b->degree + 1;
+  bspline_rows(b, mu, k, b->knots[mu], b->knots[mu + 1], rows);
+  for (unsigned i = 0; i + k < order; i++) {
+    out[i][0] = out[i][1] = 0;
+    for (unsigned j = 0; j < order; j++)
+      for (unsigned c = 0; c < 2; c++) out[i][c] += rows[i * order + j] * control[2 * (mu - b->degree + j) + c];
+  }
+}
+
+/* c of degree n vanishes at the left (right) end: divides by the distance from there. The new degree. */
+static unsigned divide(unsigned n, bool left, double (*c)[2]) {
+  for (unsigned i = 0; i < n; i++) {
+    unsigned from = left ? i + 1 : i;
+    double factor = (double)n / (double)(left ? i + 1 : n - i);
+    for (int k = 0; k < 2; k++) c[i][k] = factor * c[from][k];
+  }
+  return n - 1;
+}
+
+static double span_quality(const bspline *b, const double *control, size_t mu, bool left, bool right, int sign) {
+  double first[BSPLINE_ORDER][2], second[BSPLINE_ORDER][2], work[BSPLINE_ORDER][2], u[2], v[2], least = 1;
+  unsigned n = b->degree - 2;
+  derivative(b, control, mu, 1, first);
+  derivative(b, control, mu, 2, second);
+  if (n < (unsigned)left + (unsigned)right) return 0; /* straight */
+  if (left) n = divide(n, true, second);
+  if (right) n = divide(n, false, second);
+  for (int i = 0; i <= SAMPLES; i++) {
+    memcpy(work, first, sizeof work);
+    casteljau(b->degree - 1, (double)i / SAMPLES, work, u);
+    memcpy(work, second, sizeof work);
+    casteljau(n, (double)i / SAMPLES, work, v);
+    double size = hypot(u[0], u[1]) * hypot(v[0], v[1]), sine = size > 0 ? sign * contour_cross(u, v) / size : 0;
+    least = fmin(least, sine);
+  }
+  return least;
+}
+
+void reference_assess(const contour_shape *shape, const bspline *b, const double *control, double *quality) {
+  size_t s = 0;
+  for (size_t mu = bspline_first(b); mu < b->count; mu = bspline_next(b, mu), s++)
+    quality[s] = span_quality(b, control, mu, shape->smoothness == 2 && contour_inflection(shape, s),
+                              shape->smoothness == 2 && contour_inflection(shape, s + 1), shape->signs[s]);
+}
+
+batten_status reference_accept(batten_context *ctx, const reference_task *task, const bspline *b,
+                               const double *reference, double *control, bool *accepted) {
+  /* Somewhat stricter than fits are by default, so that there is room beside the curve. */
+  static const contour_row_options rows = {.gap = 0.03, .depth_max = 10, .margin = 1e-3, .row_limit = SIZE_MAX};
+  bspline_refine(b, 2, reference, &task->space->b, control);
+  return contour_rows_make(ctx, task->shape, &task->space->b, control, &rows, NULL, accepted, NULL);
+}
+
+/* Whether some span has inflections at both ends. */
+static bool flat_span(const contour_shape *shape) {
+  for (size_t s = 0; s < shape->spans; s++)
+    if (contour_inflection(shape, s) && contour_inflection(shape, s + 1)) return true;
+  return false;
+}
+
+static bool ends_fixed(const contour_ends *ends) {
+  return ends && !(isnan(ends->point[0][0]) && isnan(ends->point[1][0]) && isnan(ends->tangent[0][0]) &&
+                   isnan(ends->tangent[1][0]));
+}
+
+batten_status contour_reference_find(batten_context *ctx, const contour_shape *shape, const contour_space *space,
+                                     const contour_ends *ends, const contour_data *data, const double *parameters,
+                                     unsigned construction, double tension, contour_reference *out) {
+  reference_task task = {shape, space, ends, data, parameters, tension, shape->smoothness + 1};
+  if (shape->smoothness == 2 && flat_span(shape)) task.degree = 4;
+  if (task.degree > shape->degree)
+    return batten_fail(ctx, BATTEN_E_INFEASIBLE,
+                       "inflections: between two of them a cubic piece is straight; give a knot between them, or "
+                       "degree 4");
+  double *control = batten_alloc_array(ctx, 2 * space->b.count, sizeof *control);
+  if (!control) return BATTEN_E_NOMEM;
+  bool found = false;
+  unsigned by = 2;
+  batten_status st = batten_progress(ctx, "reference", 0);
+  if (st >= 0 && construction != 1) st = reference_by_removal(ctx, &task, control, &found);
+  if (st >= 0 && construction != 2 && !found) {
+    by = 1;
+    st = reference_by_legs(ctx, &task, control, &found);
+  }
+  if (st >= 0 && !found)
+    st = batten_fail(ctx, BATTEN_E_INFEASIBLE, "no reference curve of the wanted shape: %s",
+                     construction == 2  ? "knot removal does not find one; allow construction 1"
+                     : ends_fixed(ends) ? "the fixed ends contradict the signs of curvature; free them or change the "
+                                          "inflections"
+                                        : "runs between inflections turn too far for their number of spans; give "
+                                          "more knots");
+  if (st >= 0) {
+    memcpy(out->control, control, 2 * space->b.count * sizeof *control);
+    out->construction = by;
+    st = batten_progress(ctx, "reference", 1);
+  }
+  batten_free(ctx, control);
+  return st < 0 ? st : BATTEN_OK;
+}

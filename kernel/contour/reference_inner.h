@@ -1,0 +1,32 @@
+/* What the two constructions of a reference share. */
+#ifndef BATTEN_CONTOUR_REFERENCE_INNER_H
+#define BATTEN_CONTOUR_REFERENCE_INNER_H
+
+#include "contour_inner.h"
+
+typedef struct reference_task {
+  const contour_shape *shape; /* of the fit, as is the space */
+  const contour_space *space;
+  const contour_ends *ends; /* may be NULL */
+  const contour_data *data;
+  const double *parameters;
+  double tension;
+  unsigned degree; /* of references: smoothness + 1; 4 where smoothness is 2 and a span has inflections at both ends,
+                      for cubics are straight there */
+} reference_task;
+
+/* How clearly each span of a spline of a shape bends to its side: quality [spans] the least sine, with the sign of
+ * the span, of the angle from x' to x'' at a few places; next to inflections where x'' vanishes, x'' over the
+ * distance from there. What is <= 0 bends to the wrong side. */
+void reference_assess(const contour_shape *shape, const bspline *b, const double *control, double *quality);
+
+/* The curve in the space of the fit, control [task->space->b.count][2], and whether inequalities can enclose it. */
+batten_status reference_accept(batten_context *ctx, const reference_task *task, const bspline *b,
+                               const double *reference, double *control, bool *accepted);
+
+/* Construction 1 (reference_legs.c) and 2 (reference_removal.c): *found, and then control as above. Fail: NOMEM,
+ * CANCELLED, TOO_LARGE. */
+batten_status reference_by_legs(batten_context *ctx, const reference_task *task, double *control, bool *found);
+batten_status reference_by_removal(batten_context *ctx, const reference_task *task, double *control, bool *found);
+
+#endif
