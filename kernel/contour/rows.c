@@ -18,11 +18,14 @@
  *
  * What is implied holds with its own margin too, as right sides are linear in the row. A row for the second
  * derivative at an inflection of a C^2 curve is 0 by the equalities and is never written. */
-#include <float.h>
 #include <string.h>
 
 #include "base/checked.h"
 #include "contour/wedges.h"
+
+/* Rounds that make a place as straight as they may each leave `margin` of what it had: after some, nothing that
+ * rounding does not swallow. What has little left keeps this, or half. */
+static const double FLOOR = 1e-10;
 
 /* Rows that are not written. */
 enum {
@@ -106,8 +109,7 @@ static void write_row(writer *out, const bspline *b, const double *coefficients,
       out->values[out->entries++] = entry;
     }
   }
-  /* A row that holds in floating point by so much holds. */
-  out->lower[out->rows++] = fmax(margin * value, fmin(0.5 * value, 8 * DBL_EPSILON));
+  out->lower[out->rows++] = fmax(margin * value, fmin(0.5 * value, FLOOR));
   out->starts[out->rows] = out->entries;
 }
 

@@ -7,22 +7,24 @@
  * enclose an angle inside (0, pi) wherever curvature has its sign; at an inflection with x'' = 0 the second
  * differences tend to x'''. So bisection ends.
  *
- * How much of the gaps u and v leave to the first differences: the less, the nearer the second differences may come
- * to the tangent, and that is what data ask for. Where the curvature is to be as small as allowed, x'' keeps but its
- * tangential part, and its direction is that of x'; the direction of x' itself hardly changes, as long as spans turn
- * by small angles. */
+ * Where in its gap v lies says how much of it is left to the first differences, and how much to the second ones;
+ * likewise u. A first reference may be far away in direction, and first differences get most of the gaps. Later ones
+ * lie where the last solution has pushed them within its own u and v: near v with their first differences, where
+ * these want more room, or with their second ones. So a direction that was near one side of its gap is put near the
+ * other: what was at its limit becomes free. (Mid-gap in every round reaches the same sums in about twice as many.)
+ */
 #include "contour/wedges.h"
 
 #include <string.h>
 
 #include "base/checked.h"
 
-/* The part of a gap that first differences may use. */
-static const double SHARE = 0.5;
+/* The part of a gap that first differences have at first, and the least that either kind has later. */
+static const double FIRST_SHARE = 0.8, LEAST_SHARE = 0.15;
 
 /* A reference that is nearly straight, or changes its speed much, has x'' nearly along x', however small the piece. A
  * gap of this part of their angle is then enough, down to the least one. */
-static const double LIMIT_PART = 0.5, LEAST_GAP = 1e-7;
+static const double LIMIT_PART = 0.5, LEAST_GAP = 1e-9;
 
 enum { STACK = 64 }; /* > deepest bisection */
 
@@ -95,8 +97,21 @@ static bool wedge_holds(const differences *d, const contour_wedge *w) {
 /* The gap that is asked for where bisection can bring it to `limit` at most. */
 static double wanted(double gap, double limit) { return fmax(LEAST_GAP, fmin(gap, LIMIT_PART * limit)); }
 
-/* Directions for a piece, whose place and sign are set. */
-static bool wedge_find(const differences *d, double gap, contour_wedge *w) {
+/* The part of a gap for first differences, where an old direction left them `room` of it. */
+static double share(double room, double gap) { return fmin(1 - LEAST_SHARE, fmax(LEAST_SHARE, 1 - room / gap)); }
+
+/* Angle from the unit vector `mean`, to the side s. */
+static double angle_of(const double mean[2], double s, const double w[2]) {
+  return atan2(s * contour_cross(mean, w), mean[0] * w[0] + mean[1] * w[1]);
+}
+
+static void turn_by(const double mean[2], double angle, double out[2]) {
+  out[0] = mean[0] * cos(angle) - mean[1] * sin(angle);
+  out[1] = mean[1] * cos(angle) + mean[0] * sin(angle);
+}
+
+/* Directions for a piece, whose place and sign are set. old: the piece that was there, or NULL. */
+static bool wedge_find(const differences *d, double gap, const contour_wedge *old, contour_wedge *w) {
   const double pi = acos(-1), half = pi / 2, s = w->sign;
   double mean[2] = {0}, theta[2] = {INFINITY, -INFINITY}, phi[2] = {INFINITY, -INFINITY};
   for (unsigned i = 0; i < d->degree; i++)
@@ -106,7 +121,7 @@ static bool wedge_find(const differences *d, double gap, contour_wedge *w) {
   for (int k = 0; k < 2; k++) mean[k] /= size;
   double first = 0, last = 0; /* the directions at the ends of the piece, to which smaller pieces shrink */
   for (unsigned i = 0; i < d->degree; i++) {
-    double angle = atan2(s * contour_cross(mean, d->a[i]), mean[0] * d->a[i][0] + mean[1] * d->a[i][1]);
+    double angle = angle_of(mean, s, d->a[i]);
     theta[0] = fmin(theta[0], angle);
     theta[1] = fmax(theta[1], angle);
     if (i == 0) first = -angle;
@@ -122,11 +137,10 @@ static bool wedge_find(const differences *d, double gap, contour_wedge *w) {
   }
   double gap_v = phi[0] - theta[1], gap_u = theta[0] - (phi[1] - pi);
   if (!(gap_v > wanted(gap, fmin(first, last)) && gap_u > wanted(gap, pi - fmax(first, last)))) return false;
-  double u = theta[0] - SHARE * gap_u, v = theta[1] + SHARE * gap_v;
-  w->u[0] = mean[0] * cos(u) - s * mean[1] * sin(u);
-  w->u[1] = mean[1] * cos(u) + s * mean[0] * sin(u);
-  w->v[0] = mean[0] * cos(v) - s * mean[1] * sin(v);
-  w->v[1] = mean[1] * cos(v) + s * mean[0] * sin(v);
+  double share_u = old ? share(theta[0] - angle_of(mean, s, old->u), gap_u) : FIRST_SHARE;
+  double share_v = old ? share(angle_of(mean, s, old->v) - theta[1], gap_v) : FIRST_SHARE;
+  turn_by(mean, s * (theta[0] - share_u * gap_u), w->u);
+  turn_by(mean, s * (theta[1] + share_v * gap_v), w->v);
   return wedge_holds(d, w);
 }
 
@@ -139,7 +153,6 @@ typedef struct search {
   const double *reference;
   const contour_row_options *opt;
   const contour_rows *old;
-  size_t old_at; /* no old piece before it is asked for again */
   bool keep;
   contour_wedge *wedges;
   size_t count, room;
@@ -161,15 +174,27 @@ static batten_status add(search *s, const contour_wedge *w) {
   return BATTEN_OK;
 }
 
-/* The old piece that encloses w, if the reference satisfies it. Bisection of the same breaks nests. */
-static const contour_wedge *old_piece(search *s, const contour_wedge *w) {
+/* The old piece at the middle of w, or NULL. */
+static const contour_wedge *old_piece(const search *s, const contour_wedge *w) {
   if (!s->old) return NULL;
-  while (s->old_at < s->old->wedge_count && s->old->wedges[s->old_at].to <= w->from) s->old_at++;
-  if (s->old_at == s->old->wedge_count) return NULL;
-  const contour_wedge *o = &s->old->wedges[s->old_at];
+  double middle = w->from + (w->to - w->from) / 2;
+  size_t low = 0, high = s->old->wedge_count;
+  while (high - low > 1) {
+    size_t at = low + (high - low) / 2;
+    if (middle < s->old->wedges[at].from)
+      high = at;
+    else
+      low = at;
+  }
+  const contour_wedge *o = &s->old->wedges[low];
+  return o->mu == w->mu && o->sign == w->sign ? o : NULL;
+}
+
+/* Whether an old piece can stand for w: bisection of the same breaks nests. */
+static bool old_holds(const search *s, const contour_wedge *o, const contour_wedge *w) {
   differences d;
-  bool fits = o->mu == w->mu && o->sign == w->sign && o->from <= w->from && w->to <= o->to;
-  return fits && differences_set(&d, s->shape, s->b, s->reference, o) && wedge_holds(&d, o) ? o : NULL;
+  return o && o->from <= w->from && w->to <= o->to && differences_set(&d, s->shape, s->b, s->reference, o) &&
+         wedge_holds(&d, o);
 }
 
 /* The span mu, of a sign. *fits = false: it does not bend clearly enough. */
@@ -188,7 +213,8 @@ static batten_status bisect(search *s, size_t mu, signed char sign, bool *fits) 
     contour_wedge w = {.mu = mu, .from = stack[open - 1].from, .to = stack[open - 1].to, .sign = sign};
     unsigned depth = stack[--open].depth;
     double middle = w.from + (w.to - w.from) / 2;
-    bool found = differences_set(&d, s->shape, s->b, s->reference, &w) && wedge_find(&d, s->opt->gap, &w);
+    const contour_wedge *o = old_piece(s, &w);
+    bool found = differences_set(&d, s->shape, s->b, s->reference, &w) && wedge_find(&d, s->opt->gap, o, &w);
     if (!found && depth < s->opt->depth_max && w.from < middle && middle < w.to) {
       stack[open].from = middle;
       stack[open].to = w.to;
@@ -199,8 +225,7 @@ static batten_status bisect(search *s, size_t mu, signed char sign, bool *fits) 
       continue;
     }
     if (!found) {
-      const contour_wedge *o = old_piece(s, &w);
-      *fits = o != NULL;
+      *fits = old_holds(s, o, &w);
       if (!*fits) return BATTEN_OK;
       w = *o;
       while (s->count > before && s->wedges[s->count - 1].from >= w.from) s->count--;
