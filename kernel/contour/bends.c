@@ -384,7 +384,7 @@ batten_status contour_bends_find(batten_context *ctx, const contour_smooth *smoo
                                  size_t points, const double *parameters, double significance, contour_bends *out) {
   search s = {.smooth = smooth, .plot = plot, .points = points, .parameters = parameters};
   contour_bends b = {0};
-  s.noise = fmax(smooth->noise, CONTOUR_EVEN);
+  s.noise = fmax(smooth->noise, CONTOUR_EVEN * smooth->size * sqrt(fmax(1, smooth->count / CONTOUR_EVEN_COUNT)));
   batten_status st = find_runs(ctx, &s);
   if (st >= 0) {
     join_noise(&s);

@@ -25,7 +25,9 @@ batten_status contour_bends_find(batten_context *ctx, const contour_smooth *s, c
                                  size_t points, const double *parameters, double significance, contour_bends *out);
 void contour_bends_free(batten_context *ctx, contour_bends *b);
 
-/* No noise is taken for less than this part of the points' size: what is even to the eye does not bend. */
-static const double CONTOUR_EVEN = 1e-4;
+/* No noise is taken for less than this part of the points' size where there are as many points as this; where they
+ * are more, it is that of neighbours alike, so that they tell no more of it: what is even to the eye does not bend,
+ * however many points make it sure. */
+static const double CONTOUR_EVEN = 1e-4, CONTOUR_EVEN_COUNT = 100;
 
 #endif

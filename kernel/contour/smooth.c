@@ -134,6 +134,7 @@ static void fill_gram(contour_smooth *s, const contour_data *data, const double 
     s->count += w > 0;
   }
   s->square = 0;
+  double box[2][2] = {{INFINITY, INFINITY}, {-INFINITY, -INFINITY}};
   for (size_t i = 0; i < data->count; i++) {
     double u, w = (data->weights ? data->weights[i] : 1) * (s->count / total);
     if (!(w > 0)) continue;
@@ -146,7 +147,12 @@ static void fill_gram(contour_smooth *s, const contour_data *data, const double 
       for (size_t d = 0; d < 2; d++) s->right[d * s->functions + row] += w * values[k] * p[d];
     }
     s->square += w * (p[0] * p[0] + p[1] * p[1]);
+    for (size_t d = 0; d < 2; d++) {
+      box[0][d] = fmin(box[0][d], p[d]);
+      box[1][d] = fmax(box[1][d], p[d]);
+    }
   }
+  s->size = fmax(box[1][0] - box[0][0], box[1][1] - box[0][1]);
 }
 
 static double free_functions(const contour_smooth *s) { return s->closed ? 1 : 3; }
@@ -165,7 +171,8 @@ static double solve(contour_smooth *s, double bandwidth) {
     sparse_band_forward(n, s->width, s->factor, s->control + k * n);
     sparse_band_backward(n, s->width, s->factor, s->control + k * n);
   }
-  double least = fmax(contour_smooth_cost(s, s->control, NULL), 0) + 2 * s->count * CONTOUR_EXACT * CONTOUR_EXACT;
+  double exact = CONTOUR_EXACT * s->size;
+  double least = fmax(contour_smooth_cost(s, s->control, NULL), 0) + 2 * s->count * exact * exact;
   double freedom = fmax(s->count - free_functions(s), 1);
   return 2 * freedom * log(least) + 2 * determinant - 2 * ((double)n - free_functions(s)) * log(s->lambda);
 }

@@ -10,7 +10,7 @@
 
 enum { SMOOTH_DEGREE = 5, SMOOTH_ORDER = 6 };
 
-/* Of the points' size 1: data are not taken for more exact than this, since all else would be wiggles of rounding. */
+/* Of the points' size: data are not taken for more exact than this, since all else would be wiggles of rounding. */
 static const double CONTOUR_EXACT = 1e-5;
 
 typedef struct contour_smooth {
@@ -25,6 +25,7 @@ typedef struct contour_smooth {
   double *right;            /* [2][functions] sums of weight N_i point */
   double *control;          /* [2][functions] */
   double square;            /* sum of weight |point|^2 */
+  double size;              /* larger side of the box of the points */
   double count;             /* points of positive weight; their weights have the mean 1 */
   double lambda, bandwidth; /* lambda = count * bandwidth^6: about how far the curve averages */
   double noise;             /* standard deviation of a coordinate of weight 1 */
