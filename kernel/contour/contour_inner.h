@@ -7,6 +7,7 @@
  * bends.c        runs of one sign in the plot, and which of them count
  * propose.c      what is asked for of these
  * knots.c        where breaks are placed, and how many
+ * density.c      how densely: as the data lie, and as a pilot needs them
  * layout.c       breaks, inflections and signs of pieces
  * space.c        curves that satisfy the equalities: the unknowns
  * objective.c    sum of squares and tension in banded form; their minimum
@@ -91,7 +92,7 @@ void contour_input_free(batten_context *ctx, contour_input *in);
 /* Breaks of `spans` pieces or (spans = 0) as many as it takes for all points to be within tolerance, or (tolerance =
  * 0) as the data speak for, without inequalities; every run between inflections (given, in [0, 1], ascending, of
  * closed curves maybe 0) has enough pieces for the reference (smoothness 2: two between inflections). Inflections are
- * breaks. *breaks [*pieces + 1], batten's; parameters [count] in [0, 1]. Fails: NOMEM, TOO_LARGE, CANCELLED. */
+ * breaks. *breaks [*pieces + 1], batten's; parameters [count] in [0, 1], not decreasing. Fails: NOMEM, TOO_LARGE, CANCELLED. */
 typedef struct contour_knots_options {
   unsigned degree, smoothness;
   bool closed;
