@@ -138,9 +138,10 @@ void contour_space_expand(const contour_space *s, const double *y, double *contr
  * [j][k], k = 0 .. degree, of both coordinates alike. */
 typedef struct contour_objective {
   bspline b;
-  double *bend;  /* [b.count][degree + 1] integral of |x''|^2 */
-  double *band;  /* [b.count][degree + 1] */
-  double *right; /* [b.count][2] */
+  double tension; /* of bend */
+  double *bend;   /* [b.count][degree + 1] tension * integral of |x''|^2, of very short spans less */
+  double *band;   /* [b.count][degree + 1] */
+  double *right;  /* [b.count][2] */
 } contour_objective;
 batten_status contour_objective_new(batten_context *ctx, const bspline *b, contour_objective *out);
 void contour_objective_free(batten_context *ctx, contour_objective *o);

@@ -26,10 +26,13 @@ static double binomial(unsigned n, unsigned k) {
   return value;
 }
 
-static void make_bend(const bspline *b, double *bend) {
+/* bend += tension. A span of length h has coefficients of tension / h^3; where that is far above the data's, which
+ * are 1 at most, the data would drown in rounding, and the span is straight anyway: STIFF is the most it may be. */
+static void make_bend(const bspline *b, double tension, double *bend) {
+  static const double STIFF = 1e6;
   unsigned d = b->degree, order = d + 1;
   memset(bend, 0, b->count * order * sizeof *bend);
-  if (d < 2) return;
+  if (d < 2 || !(tension > 0)) return;
   unsigned p = d - 2;
   double gram[BSPLINE_ORDER][BSPLINE_ORDER], rows[BSPLINE_ORDER * BSPLINE_ORDER];
   for (unsigned i = 0; i <= p; i++)
@@ -37,13 +40,14 @@ static void make_bend(const bspline *b, double *bend) {
       gram[i][j] = binomial(p, i) * binomial(p, j) / (binomial(2 * p, i + j) * (2 * p + 1));
   for (size_t mu = bspline_first(b); mu < b->count; mu = bspline_next(b, mu)) {
     double lower = b->knots[mu], upper = b->knots[mu + 1];
+    double h = upper - lower, weight = h * fmin(tension, STIFF * h * h * h);
     bspline_rows(b, mu, 2, lower, upper, rows);
     for (unsigned i = 0; i < order; i++)
       for (unsigned j = i; j < order; j++) {
         double sum = 0;
         for (unsigned r = 0; r <= p; r++)
           for (unsigned s = 0; s <= p; s++) sum += rows[r * order + i] * gram[r][s] * rows[s * order + j];
-        bend[(mu - d + i) * order + j - i] += (upper - lower) * sum;
+        bend[(mu - d + i) * order + j - i] += weight * sum;
       }
   }
 }
@@ -59,7 +63,7 @@ batten_status contour_objective_new(batten_context *ctx, const bspline *b, conto
     contour_objective_free(ctx, &o);
     return BATTEN_E_NOMEM;
   }
-  make_bend(b, o.bend);
+  make_bend(b, 0, o.bend);
   memset(o.band, 0, entries * sizeof *o.band);
   memset(o.right, 0, 2 * b->count * sizeof *o.right);
   *out = o;
@@ -104,7 +108,9 @@ void contour_objective_set(batten_context *ctx, contour_objective *o, const cont
   size_t order = b->degree + 1, mu = bspline_first(b);
   double total = 0, values[BSPLINE_ORDER];
   memset(o->right, 0, 2 * b->count * sizeof *o->right);
-  for (size_t i = 0; i < b->count * order; i++) o->band[i] = tension * o->bend[i];
+  if (tension != o->tension) make_bend(b, tension, o->bend);
+  o->tension = tension;
+  memcpy(o->band, o->bend, b->count * order * sizeof *o->band);
   for (size_t i = 0; i < data->count; i++) total += weight_of(data, i);
   for (size_t i = 0; i < data->count; i++) {
     double weight = weight_of(data, i) / total;
