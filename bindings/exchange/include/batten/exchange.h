@@ -224,14 +224,14 @@ typedef struct batten_contours {
 } batten_contours;
 
 /* Text (.txt .xyz .csv .tsv .asc .dat, also .gz), one contour or several:
- *   blocks of lines "x y" or "x y z" parted by blank lines; or each after a line "contour N" (N points follow); or with
- *   a line of names above the numbers, of which x y z, t or "parameter", w or "weight" and contour or "curve" (its number
- *   or name; rows of one contour need not be neighbours) are taken.
- * Numbers are taken as they are: whether contours are closed is for the caller to know, who may find the first point once
- * more at the end. Points with z lie in one plane for each contour, to 1e-6 of its longest side. Where a coordinate is
- * constant, in all contours if there is one, the plane's axes are the other two in the order x y, x z, y z, and the
- * numbers stay; else it is the best plane, and its axes are these turned into it. Free with batten_contours_free. Fails as
- * batten_read_points. */
+ *   blocks of lines "x y" or "x y z" parted by blank lines; or each after a line "contour N" (N points follow); or
+ *   with a line of names above the numbers, of which x y z, t or "parameter", w or "weight" and contour or "curve"
+ *   (its number or name; rows of one contour need not be neighbours) are taken.
+ * Numbers are taken as they are: whether contours are closed is for the caller to know, who may find the first point
+ * once more at the end. Points with z lie in one plane for each contour, to 1e-6 of its longest side. Where a
+ * coordinate is constant, in all contours if there is one, the plane's axes are the other two in the order x y, x z,
+ * y z, and the numbers stay; else it is the best plane, and its axes are these turned into it. Free with
+ * batten_contours_free. Fails as batten_read_points. */
 BATTEN_API batten_status batten_read_contours(batten_context *ctx, const char *path, batten_contours *out);
 BATTEN_API void batten_contours_free(batten_context *ctx, batten_contours *contours);
 
@@ -249,10 +249,11 @@ BATTEN_API batten_write_curves_options batten_write_curves_options_default(void)
 
 /* Curves [count], by extension:
  *   .json       one: {"batten": "curve", "version": 1, "degree", "periodic", "knots", "control_points"}, several:
- *               {"batten": "contours", "version": 1, "curves": [{"degree", ...}, ...]}; a curve has "z" where its plane is
- *               horizontal, else, if there are planes, "plane": {"origin", "axes"}. Reads back to the same bits
- *   .step .stp  ISO 10303-21: a geometric curve set of B-spline curves with the same degree, knots and control points,
- *               named "curve 0", "curve 1", ...
+ *               {"batten": "contours", "version": 1, "curves": [{"degree", ...}, ...]}; a curve has "z" where its
+ *               plane is horizontal, else, if there are planes, "plane": {"origin", "axes"}. Reads back to the same
+ *               bits
+ *   .step .stp  ISO 10303-21: a geometric curve set of B-spline curves with the same degree, knots and control
+ *               points, named "curve 0", "curve 1", ...
  *   .iges .igs  entities 126, with their number and the normal of their plane
  *   .svg        paths of Bezier pieces with the plane coordinates, y upwards, exact to degree 3; the width and height
  *               are given in the unit
@@ -260,8 +261,7 @@ BATTEN_API batten_write_curves_options batten_write_curves_options_default(void)
  *   .vtp .vtk   polylines within tolerance of the curves; point data "t" and "curvature", cell data "curve"
  *   .csv        curve,t,x,y[,z],curvature: the same points, z where there are planes; curves are numbered from 0.
  *               batten_read_contours reads them
- * A closed curve ends with its first point again; there, as at knots where it jumps, the curvature is that of the side
- * from which it is asked for in batten_curve_evaluate.
+ * A closed curve ends with its first point again. Curvatures are those of batten_curve_evaluate.
  * Fails: IO, INVALID (unknown extension: lists the known), TOO_LARGE, NOMEM, CANCELLED; what stood under the name is
  * then as it was. */
 BATTEN_API batten_status batten_write_curves(batten_context *ctx, size_t count, const batten_curve *const *curves,
