@@ -180,4 +180,74 @@ static inline double contour_test_curvature(const contour_test_curve *c, const d
   return least;
 }
 
+static inline double contour_test_row(const batten_matrix *m, size_t row, const double *x) {
+  double sum = 0;
+  for (size_t at = m->starts[row]; at < m->starts[row + 1]; at++) sum += m->values[at] * x[m->indices[at]];
+  return sum;
+}
+
+/* Least slack of rows. */
+static inline double contour_test_slack(const contour_rows *rows, const double *x) {
+  double least = INFINITY;
+  for (size_t i = 0; i < rows->matrix.rows; i++)
+    least = fmin(least, contour_test_row(&rows->matrix, i, x) - rows->lower[i]);
+  return least;
+}
+
+/* All 4 d - 2 inequalities of the Lemma for every piece, less those that are 0 by the equalities, as rows of length 1
+ * with the right sides that `rows` would have; free with contour_test_full_free. */
+static inline contour_rows contour_test_full(const contour_test_curve *c, const contour_rows *rows,
+                                             const double *reference, double margin) {
+  unsigned d = c->b.degree;
+  size_t most = rows->wedge_count * (4 * d - 2), entries = 0, at = 0;
+  size_t *starts = contour_test_memory(most + 1, sizeof *starts);
+  uint32_t *indices = contour_test_memory(most * 2 * (d + 1), sizeof *indices);
+  double *values = contour_test_memory(most * 2 * (d + 1), sizeof *values);
+  double *lower = contour_test_memory(most, sizeof *lower), first[BSPLINE_ORDER * BSPLINE_ORDER];
+  for (size_t q = 0; q < rows->wedge_count; q++) {
+    const contour_wedge *w = &rows->wedges[q];
+    size_t span = (w->mu - d) / (d - c->shape.smoothness);
+    bool smooth = c->shape.smoothness == 2;
+    bool zero_first = smooth && w->from == c->b.knots[w->mu] && contour_inflection(&c->shape, span);
+    bool zero_last = smooth && w->to == c->b.knots[w->mu + 1] && contour_inflection(&c->shape, span + 1);
+    for (unsigned k = 1; k <= 2; k++) {
+      bspline_rows(&c->b, w->mu, k, w->from, w->to, first);
+      for (unsigned i = 0; i + k <= d; i++) {
+        if (k == 2 && ((zero_first && i == 0) || (zero_last && i + k == d))) continue;
+        const double *row = first + i * (d + 1);
+        double size = 0;
+        for (unsigned j = 0; j <= d; j++) size += row[j] * row[j];
+        for (int side = 0; side < 2; side++) {
+          const double *dir = side ? w->v : w->u;
+          double s = w->sign * (side && k == 1 ? -1 : 1) / sqrt(size), value = 0;
+          for (unsigned j = 0; j <= d; j++)
+            for (unsigned e = 0; e < 2; e++) {
+              indices[entries] = (uint32_t)(2 * (w->mu - d + j) + e);
+              values[entries] = s * row[j] * (e ? dir[0] : -dir[1]);
+              value += values[entries] * reference[indices[entries]];
+              entries++;
+            }
+          lower[at++] = fmax(margin * value, fmin(0.5 * value, 1e-10));
+          starts[at] = entries;
+        }
+      }
+    }
+  }
+  return (contour_rows){.matrix = batten_matrix_sparse(at, 2 * c->b.count, starts, indices, values), .lower = lower};
+}
+
+static inline void contour_test_full_free(contour_rows *r) {
+  free((void *)(uintptr_t)r->matrix.starts);
+  free((void *)(uintptr_t)r->matrix.indices);
+  free((void *)(uintptr_t)r->matrix.values);
+  free(r->lower);
+}
+
+/* Least value of rows, without their right sides. */
+static inline double contour_test_least(const contour_rows *rows, const double *x) {
+  double least = INFINITY;
+  for (size_t i = 0; i < rows->matrix.rows; i++) least = fmin(least, contour_test_row(&rows->matrix, i, x));
+  return least;
+}
+
 #endif
