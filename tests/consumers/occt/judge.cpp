@@ -5,7 +5,10 @@
  * kinks. TAP on stdout.
  *
  * A line "surface FILE PLACES EDGES CLOSED AREA" is one face instead, with so many different edges, closed or not:
- * are points, normals and curvatures at the places the same, and is it the same area? */
+ * are points, normals and curvatures at the places the same, and is it the same area?
+ *
+ * A line "curves FILE PLACES COUNT" is so many edges instead: are they the same B-splines, with the same points and
+ * derivatives at the places? */
 #include <BRepAdaptor_Surface.hxx>
 #include <BRepCheck_Analyzer.hxx>
 #include <BRepGProp.hxx>
@@ -14,6 +17,7 @@
 #include <GProp_GProps.hxx>
 #include <Geom2d_Curve.hxx>
 #include <GeomLProp_SLProps.hxx>
+#include <Geom_BSplineCurve.hxx>
 #include <Geom_Surface.hxx>
 #include <IGESControl_Reader.hxx>
 #include <Interface_Static.hxx>
@@ -29,6 +33,7 @@
 #include <TopTools_IndexedMapOfShape.hxx>
 #include <TopTools_ListOfShape.hxx>
 #include <TopoDS.hxx>
+#include <TopoDS_Edge.hxx>
 #include <TransferBRep.hxx>
 #include <Transfer_TransientProcess.hxx>
 #include <XSControl_TransferReader.hxx>
@@ -43,6 +48,7 @@
 #include <set>
 #include <sstream>
 #include <string>
+#include <vector>
 
 static int count_of, failed;
 
@@ -217,6 +223,68 @@ static void judge_surface(const std::string &file, const std::string &places, si
   line(off <= 1e-7, name + "area " + text(props.Mass()) + ", off by " + text(off));
 }
 
+/* One curve of a places' file: its form, and the largest differences of points and derivatives over their sizes. */
+static void judge_curve(const TopoDS_Edge &edge, std::istream &in, const std::string &name) {
+  int degree, closed, knot_count, places;
+  in >> degree >> closed >> knot_count >> places;
+  std::vector<double> knots(knot_count);
+  for (double &knot : knots) in >> knot;
+  double first, last, t, x, y, z, off[3] = {0}, size[3] = {0};
+  Handle(Geom_BSplineCurve) curve = Handle(Geom_BSplineCurve)::DownCast(BRep_Tool::Curve(edge, first, last));
+  if (curve.IsNull()) return line(false, name + "no B-spline");
+  /* closed curves of STEP become periodic ones there: their ends are knots like others then */
+  bool same = curve->Degree() == degree && !curve->IsRational() && (closed || !curve->IsPeriodic()) &&
+              first == knots.front() && last == knots.back();
+  size_t at = 0;
+  for (int i = 1; same && i <= curve->NbKnots(); i++) {
+    size_t times = 0;
+    while (at + times < knots.size() && knots[at + times] == curve->Knot(i)) times++;
+    bool end = i == 1 || i == curve->NbKnots();
+    same = times > 0 && (curve->Multiplicity(i) == (int)times || (end && curve->IsPeriodic()));
+    at += times;
+  }
+  same = same && at == knots.size();
+  line(same, name + "degree " + std::to_string(curve->Degree()) + " and the same knots" +
+                 (curve->IsPeriodic() ? ", periodic" : ""));
+  line(curve->IsClosed() == (closed != 0) && BRep_Tool::IsClosed(edge) == (closed != 0),
+       name + (closed ? "closed" : "open"));
+  for (int i = 0; i < places; i++) {
+    gp_Pnt p;
+    gp_Vec have[3], d2;
+    in >> t;
+    curve->D2(t, p, have[1], have[2]);
+    have[0] = gp_Vec(p.XYZ());
+    for (int order = 0; order < 3; order++) {
+      in >> x >> y >> z;
+      gp_Vec expected(x, y, z);
+      off[order] = std::fmax(off[order], (have[order] - expected).Magnitude());
+      size[order] = std::fmax(size[order], expected.Magnitude());
+    }
+  }
+  for (int order = 0; order < 3; order++) off[order] /= size[order] > 0 ? size[order] : 1;
+  line(in.good() && off[0] <= 1e-13 && off[1] <= 1e-12 && off[2] <= 1e-12,
+       name + std::to_string(places) + " places: points within " + text(off[0]) + ", derivatives " + text(off[1]) +
+           ", " + text(off[2]));
+}
+
+static void judge_curves(const std::string &file, const std::string &places, size_t count) {
+  const std::string name = file.substr(file.rfind('/') + 1) + ": ";
+  IGESControl_Reader first; /* sets the defaults */
+  /* a corner is no reason to cut a curve */
+  Interface_Static::SetIVal("read.iges.bspline.continuity", 0);
+  TopoDS_Shape shape = read_file(file);
+  if (shape.IsNull()) return line(false, name + "cannot be read");
+  line(BRepCheck_Analyzer(shape).IsValid(), name + "valid");
+  TopTools_IndexedMapOfShape map;
+  TopExp::MapShapes(shape, TopAbs_EDGE, map);
+  line((size_t)map.Extent() == count && count_shapes(shape, TopAbs_FACE) == 0,
+       name + std::to_string(map.Extent()) + " edges of " + std::to_string(count));
+  if ((size_t)map.Extent() != count) return;
+  std::ifstream in(places);
+  for (int i = 1; i <= map.Extent(); i++)
+    judge_curve(TopoDS::Edge(map(i)), in, name + "curve " + std::to_string(i - 1) + ": ");
+}
+
 static void judge(const std::string &file, size_t faces, size_t solids, double volume, double area, double normals) {
   bool step = file.size() > 5 && (file.rfind(".step") == file.size() - 5 || file.rfind(".stp") == file.size() - 4);
   TopoDS_Shape shape;
@@ -278,6 +346,13 @@ int main(int argc, char **argv) {
       bool closed;
       in >> word >> surface >> places >> edges >> closed >> area;
       judge_surface(surface, places, edges, closed, std::strtod(area.c_str(), nullptr));
+      continue;
+    }
+    if (row.compare(0, 7, "curves ") == 0) {
+      std::string word, curves, places;
+      size_t count;
+      in >> word >> curves >> places >> count;
+      judge_curves(curves, places, count);
       continue;
     }
     std::string file, volume, area, normals;
