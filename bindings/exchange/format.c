@@ -43,6 +43,11 @@ bx_format bx_format_of(const char *path, bool *gz) {
   return BX_UNKNOWN;
 }
 
+bool bx_is_csv(const char *path) {
+  size_t length = strlen(path), at = extension(path, length);
+  return equals(path + at, length - at, "csv");
+}
+
 batten_status bx_check_pointers(batten_context *ctx, const char *path, const void *out, const char *out_name) {
   if (!path) return batten_fail(ctx, BATTEN_E_INVALID, "path: NULL; name a file");
   if (!*path) return batten_fail(ctx, BATTEN_E_INVALID, "path: empty; name a file");

@@ -148,13 +148,6 @@ static void write_vtp(bx_writer *w, const batten_outline *outline) {
   vtk_end(&v);
 }
 
-/* Among the extensions of text, .csv is the one with commas. */
-static bool is_csv(const char *path) {
-  size_t length = 0;
-  while (path[length]) length++;
-  return length > 3 && (path[length - 3] | 0x20) == 'c';
-}
-
 batten_status batten_write_outline(batten_context *ctx, const batten_outline *outline, const char *path) {
   batten_status st = bx_check_pointers(ctx, path, outline, "outline");
   if (st != BATTEN_OK) return st;
@@ -178,7 +171,7 @@ batten_status batten_write_outline(batten_context *ctx, const batten_outline *ou
       write_obj(&w, outline);
       break;
     default:
-      write_text(&w, outline, is_csv(path));
+      write_text(&w, outline, bx_is_csv(path));
   }
   return bx_commit(&w);
 }

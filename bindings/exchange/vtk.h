@@ -16,4 +16,12 @@ void vtk_declare(vtk_file *v, const char *type, const char *name, size_t compone
 void vtk_begin_appended(vtk_file *v, const char *type);
 void vtk_end(vtk_file *v);
 
+/* ---- files from before XML: see vtk_legacy.c --------------------------------------------------------- */
+
+/* Up to the points, of which there are so many. */
+void vtk_legacy_begin(bx_writer *w, size_t points);
+void vtk_legacy_put_double(bx_writer *w, double value);
+/* 32 bits. */
+void vtk_legacy_put_int(bx_writer *w, size_t value);
+
 #endif

@@ -131,8 +131,8 @@ static batten_status check_cad(batten_context *ctx, const bx_curve_set *set, siz
 
 /* ---- the file ---------------------------------------------------------------------------------------- */
 
-static void write_format(bx_writer *w, const bx_curve_set *set, const batten_write_curves_options *o,
-                         bx_format format) {
+static void write_format(bx_writer *w, const bx_curve_set *set, const bx_curve_samples *samples,
+                         const batten_write_curves_options *o, bx_format format) {
   char name[BX_PRODUCT_NAME];
   bx_product product = product_of(o);
   bx_complete_product(&product, w->path, name);
@@ -149,14 +149,31 @@ static void write_format(bx_writer *w, const bx_curve_set *set, const batten_wri
     case BX_VTU:
       bx_write_vtu_curves(w, set);
       break;
+    case BX_VTP:
+      bx_write_vtp_curves(w, set, samples);
+      break;
+    case BX_VTK:
+      bx_write_vtk_curves(w, set, samples);
+      break;
+    case BX_TEXT:
+      bx_write_csv_curves(w, set, samples);
+      break;
     default:
       bx_write_json_curves(w, set);
   }
 }
 
+static bool is_known(bx_format format, const char *path) {
+  static const bx_format known[] = {BX_JSON, BX_STEP, BX_IGES, BX_SVG, BX_VTU, BX_VTP, BX_VTK};
+  for (size_t i = 0; i < sizeof known / sizeof known[0]; i++)
+    if (format == known[i]) return true;
+  return bx_is_csv(path);
+}
+
 batten_status batten_write_curves(batten_context *ctx, size_t count, const batten_curve *const *curves,
                                   const batten_write_curves_options *opt, const char *path) {
   batten_write_curves_options o = opt ? *opt : batten_write_curves_options_default();
+  bx_curve_samples samples = {0};
   bx_writer w;
   size_t least;
   batten_status st = bx_check_pointers(ctx, path, curves, "curves");
@@ -164,16 +181,21 @@ batten_status batten_write_curves(batten_context *ctx, size_t count, const batte
   if (st == BATTEN_OK) st = check_options(ctx, count, &o);
   if (st != BATTEN_OK) return st;
   bx_format format = bx_format_of(path, NULL);
-  if (format != BX_JSON && format != BX_STEP && format != BX_IGES && format != BX_SVG && format != BX_VTU)
+  if (!is_known(format, path))
     return batten_fail(ctx, BATTEN_E_INVALID,
                        "%s: curves are written as .json .step .stp .iges .igs .svg .vtu .vtp .vtk .csv; rename the "
                        "file",
                        bx_short_path(path));
   bx_curve_set set = measure(count, curves, o.planes, &least);
+  if (!(o.tolerance > 0)) o.tolerance = set.extent > 0 ? 1e-4 * set.extent : 1; /* all are points */
   if (format == BX_STEP || format == BX_IGES) st = check_cad(ctx, &set, least, o.unit);
-  if (!(o.tolerance > 0)) o.tolerance = 1e-4 * set.extent;
+  if (st == BATTEN_OK && (format == BX_VTP || format == BX_VTK || format == BX_TEXT))
+    st = bx_sample_curves(ctx, &set, o.tolerance, &samples);
   if (st == BATTEN_OK) st = bx_create(&w, ctx, path);
-  if (st != BATTEN_OK) return st;
-  write_format(&w, &set, &o, format);
-  return bx_commit(&w);
+  if (st == BATTEN_OK) {
+    write_format(&w, &set, &samples, &o, format);
+    st = bx_commit(&w);
+  }
+  bx_free_samples(ctx, &samples);
+  return st;
 }

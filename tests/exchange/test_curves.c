@@ -249,7 +249,7 @@ static void test_calls(batten_context *ctx, scratch *s) {
     T_STATUS(batten_write_curves(ctx, 2, two, NULL, i ? "p.step" : "p.igs"), BATTEN_E_INVALID, ctx,
              "curves[1]: its size is 0 mm; CAD files need 1e-05 mm at least");
   T_CHECK(scratch_count(s) == 0, "no file is begun");
-  static const char *const others[] = {"p.json", "p.svg", "p.vtu"};
+  static const char *const others[] = {"p.json", "p.svg", "p.vtu", "p.csv", "p.vtp", "p.vtk"};
   for (size_t i = 0; i < sizeof others / sizeof others[0]; i++) {
     T_OK(batten_write_curves(ctx, 1, two + 1, NULL, scratch_file(s, others[i])), ctx);
     unlink(s->name);
@@ -525,6 +525,123 @@ static void test_vtu(batten_context *ctx, scratch *s) {
   free_all(&c);
 }
 
+/* ---- points ------------------------------------------------------------------------------------------ */
+
+/* Largest distance of places on the curve from the polygon's part over the same parameters. */
+static double polygon_error(batten_context *ctx, const batten_curve *curve, size_t count, const double *t,
+                            const double *points) {
+  double worst = 0;
+  for (size_t i = 0; i + 1 < count; i++)
+    for (int k = 0; k <= 8; k++) {
+      const double *a = points + 2 * i, *b = a + 2;
+      double at = t[i] + (t[i + 1] - t[i]) * k / 8, along[2] = {b[0] - a[0], b[1] - a[1]};
+      batten_curve_point p;
+      if (batten_curve_evaluate(ctx, curve, 1, &at, &p) < 0) return INFINITY;
+      double square = along[0] * along[0] + along[1] * along[1];
+      double part = ((p.point[0] - a[0]) * along[0] + (p.point[1] - a[1]) * along[1]) / square;
+      part = fmin(fmax(part, 0), 1);
+      worst = fmax(worst, hypot(a[0] + part * along[0] - p.point[0], a[1] + part * along[1] - p.point[1]));
+    }
+  return worst;
+}
+
+/* What batten_read_contours makes of it: the points of the curves at their parameters, to the bit in the plane. */
+static void test_csv(batten_context *ctx, scratch *s) {
+  curves c = make_all(ctx);
+  for (int space = 0; space < 2; space++) {
+    batten_write_curves_options o = batten_write_curves_options_default();
+    batten_contours back = {0};
+    double worst = 0, off = 0;
+    bool same = true;
+    o.planes = space ? c.planes : NULL;
+    o.tolerance = 1e-3;
+    T_OK(batten_write_curves(ctx, CURVE_CASES, all(&c), &o, scratch_file(s, "a.csv")), ctx);
+    T_OK(batten_read_contours(ctx, s->name, &back), ctx);
+    T_CHECK(back.count == CURVE_CASES && back.parameters && (back.planes != NULL) == space, "%zu contours, %s",
+            back.count, space ? "in space" : "plane");
+    if (back.count != CURVE_CASES) return;
+    for (size_t i = 0; i < CURVE_CASES; i++) {
+      size_t first = back.starts[i], count = back.starts[i + 1] - first;
+      const double *points = back.points + 2 * first, *t = back.parameters + first;
+      batten_curve_form form = batten_curve_get(c.items[i]);
+      same = same && t[0] == form.knots[0] && t[count - 1] == form.knots[form.knot_count - 1];
+      for (size_t k = 0; k < count; k++) {
+        batten_curve_point p;
+        same = same && batten_curve_evaluate(ctx, c.items[i], 1, &t[k], &p) >= 0;
+        if (!space) {
+          same = same && !memcmp(p.point, points + 2 * k, sizeof p.point);
+          continue;
+        }
+        for (int e = 0; e < 3; e++) {
+          const batten_plane *from = &c.planes[i], *to = &back.planes[i];
+          double x = from->origin[e] + p.point[0] * from->axes[0][e] + p.point[1] * from->axes[1][e];
+          double y = to->origin[e] + points[2 * k] * to->axes[0][e] + points[2 * k + 1] * to->axes[1][e];
+          off = fmax(off, fabs(x - y));
+        }
+      }
+      if (!space) worst = fmax(worst, polygon_error(ctx, c.items[i], count, t, points));
+      if (form.closed) same = same && !memcmp(points, points + 2 * count - 2, 2 * sizeof *points);
+    }
+    T_CHECK(same, "points at their parameters, from end to end; closed curves end where they begin");
+    if (space)
+      T_RATIO(off, 1e-14 * 32, "the same places in space");
+    else
+      T_RATIO(worst, 1e-3, "the polygons are within the tolerance");
+    batten_contours_free(ctx, &back);
+  }
+  char *text = text_of(s->name);
+  T_CHECK(!strncmp(text, "curve,t,x,y,z,curvature\n0,0,", 28), "columns by name");
+  free(text);
+  /* its first derivative vanishes at the start */
+  static const double knots[] = {0, 0, 0, 1, 1, 1}, cusp[] = {0, 0, 0, 0, 1, 1};
+  batten_curve *curve = NULL;
+  T_OK(batten_curve_create(ctx, &(batten_curve_form){2, 6, knots, cusp, 0}, &curve), ctx);
+  T_OK(batten_write_curves(ctx, 1, (const batten_curve *const *)&curve, NULL, scratch_file(s, "cusp.csv")), ctx);
+  text = text_of(s->name);
+  T_CHECK(!strncmp(text, "curve,t,x,y,curvature\n0,0,0,0,nan\n", 34), "no tangent, no curvature");
+  free(text);
+  batten_curve_free(curve);
+  free_all(&c);
+}
+
+static void test_vtp(batten_context *ctx, scratch *s) {
+  curves c = make_all(ctx);
+  batten_write_curves_options o = batten_write_curves_options_default();
+  batten_contours plane = {0};
+  size_t size, legacy_size;
+  o.tolerance = 0.01;
+  T_OK(batten_write_curves(ctx, CURVE_CASES, all(&c), &o, scratch_file(s, "b.csv")), ctx);
+  T_OK(batten_read_contours(ctx, s->name, &plane), ctx);
+  T_OK(batten_write_curves(ctx, CURVE_CASES, all(&c), &o, scratch_file(s, "b.vtp")), ctx);
+  unsigned char *bytes = file_read(s->name, &size);
+  T_OK(batten_write_curves(ctx, CURVE_CASES, all(&c), &o, scratch_file(s, "b.vtk")), ctx);
+  unsigned char *legacy = file_read(s->name, &legacy_size);
+  const unsigned char *blocks[6] = {first_block(bytes, size)};
+  T_CHECK(blocks[0] && plane.count == CURVE_CASES, "the same polygons as .csv has");
+  if (!blocks[0] || plane.count != CURVE_CASES) return;
+  for (int i = 1; i < 6; i++) blocks[i] = next_block(blocks[i - 1]);
+  size_t count = plane.starts[CURVE_CASES];
+  bool same = word(blocks[0]) == 24 * count && word(blocks[4]) == 8 * count && word(blocks[5]) == 8 * CURVE_CASES;
+  for (size_t i = 0; same && i < count; i++)
+    same = real(blocks[0] + 8 + 24 * i) == plane.points[2 * i] &&
+           real(blocks[0] + 16 + 24 * i) == plane.points[2 * i + 1] && real(blocks[0] + 24 + 24 * i) == 0 &&
+           real(blocks[1] + 8 + 8 * i) == plane.parameters[i] && word(blocks[4] + 8 + 8 * i) == i;
+  for (size_t i = 0; same && i < CURVE_CASES; i++)
+    same = word(blocks[3] + 8 + 8 * i) == i && word(blocks[5] + 8 + 8 * i) == plane.starts[i + 1];
+  T_CHECK(same, "points, parameters, numbers and lines of %zu places", count);
+  char head[160];
+  snprintf(head, sizeof head, "# vtk DataFile Version 3.0\nbatten %s\nBINARY\nDATASET POLYDATA\nPOINTS %zu double\n",
+           batten_version(), count);
+  size_t at = strlen(head);
+  same = legacy_size > at + 24 * count && !memcmp(legacy, head, at);
+  for (size_t i = 0; same && i < 24 * count; i++) same = legacy[at + i] == blocks[0][8 + i / 8 * 8 + 7 - i % 8];
+  T_CHECK(same, ".vtk: the same points, big endian");
+  free(bytes);
+  free(legacy);
+  batten_contours_free(ctx, &plane);
+  free_all(&c);
+}
+
 /* ---- failures ---------------------------------------------------------------------------------------- */
 
 typedef struct job {
@@ -548,7 +665,7 @@ static batten_status read_again(batten_context *ctx, void *arg) {
 }
 
 static void test_failures(batten_context *ctx, scratch *s) {
-  static const char *const names[] = {"f.step", "f.iges", "f.vtu", "f.svg", "f.json"};
+  static const char *const names[] = {"f.step", "f.iges", "f.vtu", "f.svg", "f.json", "f.csv", "f.vtp", "f.vtk"};
   curves c = make_all(ctx);
   job j = {&c, ""};
   for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
@@ -577,6 +694,8 @@ int main(void) {
   test_svg(ctx, &s);
   test_svg_box(ctx, &s);
   test_vtu(ctx, &s);
+  test_csv(ctx, &s);
+  test_vtp(ctx, &s);
   test_failures(ctx, &s);
   scratch_close(&s);
   T_CHECK(batten_bytes_in_use(ctx) == 0, "all is released");
