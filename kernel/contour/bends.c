@@ -388,7 +388,7 @@ batten_status contour_bends_find(batten_context *ctx, const contour_smooth *smoo
   batten_status st = find_runs(ctx, &s);
   if (st >= 0) {
     join_noise(&s);
-    st = contour_forced_new(ctx, smooth, &s.forced);
+    st = contour_forced_new(ctx, smooth, smooth->lambda, &s.forced);
   }
   if (st >= 0) st = join_insignificant(ctx, &s, significance);
   if (st >= 0 && s.left > 1) {

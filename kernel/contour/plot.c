@@ -12,7 +12,8 @@ static void sample(const contour_smooth *s, double t, double *out, double *angle
   double speed2 = jet[1][0] * jet[1][0] + jet[1][1] * jet[1][1], speed = sqrt(speed2);
   out[0] = t;
   out[1] = speed > 0 ? contour_cross(jet[1], jet[2]) / (speed2 * speed) : 0;
-  out[2] = speed > 0 ? fmax(s->noise, CONTOUR_EXACT * s->size) * sqrt(contour_smooth_variance(s, t)) / speed2 : INFINITY;
+  out[2] =
+      speed > 0 ? fmax(s->noise, CONTOUR_EXACT * s->size) * sqrt(contour_smooth_variance(s, t)) / speed2 : INFINITY;
   *angle = atan2(jet[1][1], jet[1][0]);
 }
 

@@ -99,7 +99,7 @@ static double dot(size_t n, const double *a, const double *b) {
   return sum;
 }
 
-double contour_smooth_cost(const contour_smooth *s, const double *control, double *squares) {
+double contour_smooth_cost(const contour_smooth *s, double lambda, const double *control, double *squares) {
   const size_t n = s->functions;
   double sum = s->square - 2 * dot(2 * n, s->right, control), rough = 0;
   for (size_t k = 0; k < 2; k++) {
@@ -107,7 +107,7 @@ double contour_smooth_cost(const contour_smooth *s, const double *control, doubl
     rough += form(s, s->penalty, control + k * n);
   }
   if (squares) *squares = sum;
-  return sum + s->lambda * rough;
+  return sum + lambda * rough;
 }
 
 static void fill_penalty(contour_smooth *s) {
@@ -172,7 +172,7 @@ static double solve(contour_smooth *s, double bandwidth) {
     sparse_band_backward(n, s->width, s->factor, s->control + k * n);
   }
   double exact = CONTOUR_EXACT * s->size;
-  double least = fmax(contour_smooth_cost(s, s->control, NULL), 0) + 2 * s->count * exact * exact;
+  double least = fmax(contour_smooth_cost(s, s->lambda, s->control, NULL), 0) + 2 * s->count * exact * exact;
   double freedom = fmax(s->count - free_functions(s), 1);
   return 2 * freedom * log(least) + 2 * determinant - 2 * ((double)n - free_functions(s)) * log(s->lambda);
 }
@@ -216,7 +216,8 @@ static void invert(contour_smooth *s) {
   }
 }
 
-/* What the fit leaves of the points, by the degrees of freedom that it leaves. */
+/* What the fit leaves of the points across the curve, by the degrees of freedom that it leaves. Along the curve
+ * points have hardly a distance where their parameters are estimated from themselves. */
 static void find_noise(contour_smooth *s, const contour_data *data, const double *parameters) {
   double used = 0, squares = 0, total = 0;
   for (size_t j = 0; j < s->functions; j++)
@@ -224,24 +225,21 @@ static void find_noise(contour_smooth *s, const contour_data *data, const double
       used += (i ? 2 : 1) * s->gram[j * (s->width + 1) + i] * s->inverse[j * (s->width + 1) + i];
   for (size_t i = 0; i < data->count; i++) total += data->weights ? data->weights[i] : 1;
   for (size_t i = 0; i < data->count; i++) {
-    double u, values[SMOOTH_ORDER], d[2] = {data->points[2 * i], data->points[2 * i + 1]};
-    double w = (data->weights ? data->weights[i] : 1) * (s->count / total);
+    double jet[3][2], w = (data->weights ? data->weights[i] : 1) * (s->count / total);
     if (!(w > 0)) continue;
-    size_t span = contour_smooth_span(s, parameters[i], &u);
-    contour_smooth_basis(s, u, 0, values);
-    for (size_t k = 0; k < SMOOTH_ORDER; k++)
-      for (size_t c = 0; c < 2; c++)
-        d[c] -= values[k] * s->control[c * s->functions + contour_smooth_row(s, span + k)];
-    squares += w * (d[0] * d[0] + d[1] * d[1]);
+    contour_smooth_jet(s, s->control, parameters[i], jet);
+    double d[2] = {data->points[2 * i] - jet[0][0], data->points[2 * i + 1] - jet[0][1]};
+    double speed = hypot(jet[1][0], jet[1][1]), across = speed > 0 ? contour_cross(jet[1], d) / speed : 0;
+    squares += w * across * across;
   }
   /* A curve through nearly all points leaves no freedom to tell noise by: then its roughness tells, as likely as
    * the residual where both are. */
   double left = s->count - used;
   if (left < 0.1 * s->count) {
-    squares = fmax(squares, contour_smooth_cost(s, s->control, NULL));
+    squares = fmax(squares, 0.5 * contour_smooth_cost(s, s->lambda, s->control, NULL));
     left = fmax(s->count - free_functions(s), 1);
   }
-  s->noise = sqrt(squares / (2 * left));
+  s->noise = sqrt(squares / left);
 }
 
 static batten_status level_new(batten_context *ctx, bool closed, size_t spans, contour_smooth *s) {

@@ -56,7 +56,7 @@ void contour_smooth_basis(const contour_smooth *s, double u, unsigned order, dou
 void contour_smooth_jet(const contour_smooth *s, const double *control, double t, double jet[3][2]);
 /* The variance of the second derivative of a coordinate at t, noise 1. */
 double contour_smooth_variance(const contour_smooth *s, double t);
-/* The sum that is minimal at s->control, and the sum of squares alone. */
-double contour_smooth_cost(const contour_smooth *s, const double *control, double *squares);
+/* The sum with a lambda; squares NULL, or the sum of squares alone. */
+double contour_smooth_cost(const contour_smooth *s, double lambda, const double *control, double *squares);
 
 #endif
