@@ -1,0 +1,181 @@
+/* Shape-preserving curves through points of the plane.
+ *   bench-contour [random cases = 1000] [most points = 100000]
+ *
+ * 1. Growth: 100 to 100,000 points with spans in proportion, up to 2,000: times of the parts, one thread.
+ * 2. Random cases: 20 to 2,000 points, degrees 2 to 6, C^1 and C^2, 0 to 6 inflections, noise to 5 %; with the
+ *    inflections given, and found. What is proven, whether a second round is ever worse, the sum of squares beside
+ * that without inequalities, and which construction the first reference is from. CSV lines start with "csv,". */
+#include <batten/batten.h>
+#include <batten/contour.h>
+#include <stdio.h>
+
+#include "contour_scenes.h"
+
+static int by_value(const void *a, const void *b) {
+  double x = *(const double *)a, y = *(const double *)b;
+  return (x > y) - (x < y);
+}
+
+/* Quantile of values that are put in order. */
+static double quantile(size_t n, double *values, double q) {
+  if (n == 0) return NAN;
+  qsort(values, n, sizeof *values, by_value);
+  return values[(size_t)(q * (double)(n - 1))];
+}
+
+/* ---- growth -------------------------------------------------------------------------------------- */
+
+static void print_growth(size_t count, double seconds, double last, const batten_contour_info *f, batten_status st) {
+  printf("| %zu | %zu | %.1f | %.2f | %.1f | %.1f | %.1f | %.1f | %.1f | %.1f | %.1f | %zu | %s |\n", count, f->spans,
+         1e3 * seconds, last > 0 ? seconds / last : NAN, 1e3 * f->time_parameters_s, 1e3 * f->time_knots_s,
+         1e3 * f->time_reference_s, 1e3 * f->time_rows_s, 1e3 * f->time_qp_s, 1e3 * f->time_correction_s,
+         1e3 * f->time_check_s, f->iterations,
+         st < 0               ? batten_status_name(st)
+         : f->shape.certified ? "yes"
+                              : "no");
+  printf("csv,growth,%zu,%zu,%.6f,%u,%.6g,%.6g\n", count, f->spans, seconds, f->rounds, f->lsq, f->lsq_unconstrained);
+  fflush(stdout);
+}
+
+/* Points in steps of about sqrt(10); a span for 50 of them. */
+static void run_growth(batten_context *ctx, size_t most) {
+  static const size_t counts[] = {100, 300, 1000, 3000, 10000, 30000, 100000};
+  double last = 0;
+  printf("\n## Growth: cubic, C^2, 4 inflections, noise 0.1 %%, two rounds of three corrections; times in ms\n\n");
+  printf(
+      "| points | spans | whole | times the last | parameters | knots | reference | rows | programs | correction | "
+      "proof | iterations | proven |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
+  for (size_t i = 0; i < sizeof counts / sizeof *counts && counts[i] <= most; i++) {
+    contour_scene s = contour_scene_make(
+        &(contour_rule){.kind = CONTOUR_WAVE, .count = counts[i], .inflections = 4, .noise = 0.001, .seed = 9});
+    batten_contour_options o = batten_contour_options_default();
+    batten_contour_info f = {0};
+    batten_curve *curve = NULL;
+    o.spans = counts[i] / 50 > 12 ? counts[i] / 50 : 12;
+    o.rounds = 2;
+    o.inflection_count = s.inflection_count;
+    o.inflections = s.inflections;
+    o.parameters = s.lengths;
+    o.domain[0] = 0;
+    o.domain[1] = 1;
+    double start = batten_now();
+    batten_status st = batten_contour_fit(ctx, s.count, s.points, &o, &curve, NULL, NULL, &f);
+    double seconds = batten_now() - start;
+    print_growth(counts[i], seconds, last, &f, st);
+    if (st < 0) printf("%s\n", batten_error(ctx));
+    last = seconds;
+    batten_curve_free(curve);
+    contour_scene_free(&s);
+  }
+}
+
+/* ---- random cases -------------------------------------------------------------------------------- */
+
+typedef struct tally {
+  size_t tried, proven, accepted, refused, unproven, failed; /* refused: the data have another shape */
+  size_t worse, legs, below, right;                          /* right: as many inflections as the curve has */
+  size_t done;
+  double *ratios, *reference, *seconds, *rows;
+} tally;
+
+static batten_contour_options random_options(const contour_scene *s, uint64_t seed, bool given) {
+  batten_contour_options o = batten_contour_options_default();
+  uint64_t state = seed ^ 0x6a09e667f3bcc909u;
+  o.degree = 2 + (unsigned)(5 * scene_uniform(&state));
+  o.smoothness = o.degree > 2 && scene_uniform(&state) < 0.6 ? 2 : 1;
+  o.closed = s->closed;
+  if (!given) return o;
+  o.inflection_count = s->inflection_count;
+  o.inflections = s->inflections;
+  o.sign = s->sign;
+  o.parameters = s->lengths;
+  o.domain[0] = 0;
+  o.domain[1] = 1;
+  return o;
+}
+
+static void count_fit(tally *t, uint64_t seed, const contour_rule *rule, const contour_scene *s,
+                      const batten_contour_options *o, batten_status st, const batten_contour_info *f,
+                      double seconds) {
+  t->accepted += st == BATTEN_OK;
+  t->refused += st == BATTEN_W_SHAPE;
+  t->unproven += st == BATTEN_W_ACCURACY;
+  t->proven += f->shape.certified != 0;
+  t->legs += f->construction == 1;
+  t->below += f->lsq <= f->lsq_reference;
+  t->right += f->inflections_found == s->inflection_count;
+  for (unsigned r = 1; r < f->rounds && r < BATTEN_CONTOUR_ROUNDS_MAX; r++)
+    if (f->lsq_per_round[r] > f->lsq_per_round[r - 1]) {
+      t->worse++;
+      break;
+    }
+  t->ratios[t->done] = f->lsq_unconstrained > 0 ? f->lsq / f->lsq_unconstrained : 1;
+  t->reference[t->done] = f->lsq_reference > 0 ? f->lsq / f->lsq_reference : 1;
+  t->seconds[t->done] = seconds;
+  t->rows[t->done] = f->rounds ? (double)f->rows_per_round[f->rounds - 1] : 0;
+  t->done++;
+  printf("csv,random,%zu,%d,%zu,%u,%u,%.4g,%zu,%zu,%zu,%zu,%s,%.6g,%.6g,%.6g,%u,%u,%.4f\n", (size_t)seed,
+         (int)rule->kind, s->count, o->degree, o->smoothness, rule->noise, s->inflection_count, f->inflections_wanted,
+         f->inflections_found, f->spans, batten_status_name(st), f->lsq_unconstrained, f->lsq_reference, f->lsq,
+         f->construction, f->rounds, seconds);
+}
+
+static void print_tally(tally *t) {
+  printf("proven %zu of %zu: accepted %zu, refused for their shape %zu, not proven %zu; failed %zu\n", t->proven,
+         t->tried, t->accepted, t->refused, t->unproven, t->failed);
+  printf(
+      "a later round worse than the one before: %zu; reference by directions of legs: %zu; no worse than the first "
+      "reference: %zu; as many inflections as the true curve: %zu\n",
+      t->worse, t->legs, t->below, t->right);
+  printf("| | least | 10 %% | median | 90 %% | 99 %% | most |\n|---|---|---|---|---|---|---|\n");
+  static const char *const names[4] = {"sum / sum without inequalities", "sum / sum of the reference", "seconds",
+                                       "inequalities of the last round"};
+  double *values[4] = {t->ratios, t->reference, t->seconds, t->rows};
+  for (int k = 0; k < 4; k++) {
+    static const double at[6] = {0, 0.1, 0.5, 0.9, 0.99, 1};
+    printf("| %s |", names[k]);
+    for (int q = 0; q < 6; q++) printf(" %.4g |", quantile(t->done, values[k], at[q]));
+    printf("\n");
+  }
+}
+
+static void run_random(batten_context *ctx, size_t cases, bool given) {
+  tally t = {.tried = cases};
+  double **values[4] = {&t.ratios, &t.reference, &t.seconds, &t.rows};
+  for (int k = 0; k < 4; k++) *values[k] = contour_scene_allocate(cases);
+  printf("\n## %zu random cases, inflections %s\n\n", cases, given ? "given" : "found");
+  for (uint64_t seed = 0; seed < cases; seed++) {
+    contour_rule rule = contour_rule_random(seed);
+    contour_scene s = contour_scene_make(&rule);
+    batten_contour_options o = random_options(&s, seed, given);
+    batten_contour_info f = {0};
+    batten_curve *curve = NULL;
+    double start = batten_now();
+    batten_status st = batten_contour_fit(ctx, s.count, s.points, &o, &curve, NULL, NULL, &f);
+    double seconds = batten_now() - start;
+    if (st < 0) {
+      printf("case %zu: %s %s\n", (size_t)seed, batten_status_name(st), batten_error(ctx));
+      t.failed++;
+    } else {
+      count_fit(&t, seed, &rule, &s, &o, st, &f, seconds);
+    }
+    batten_curve_free(curve);
+    contour_scene_free(&s);
+  }
+  print_tally(&t);
+  for (int k = 0; k < 4; k++) free(*values[k]);
+}
+
+int main(int argc, char **argv) {
+  size_t cases = argc > 1 ? strtoul(argv[1], NULL, 10) : 1000, most = argc > 2 ? strtoul(argv[2], NULL, 10) : 100000;
+  batten_context *ctx = NULL;
+  if (batten_context_new(NULL, &ctx) < 0) return 1;
+  printf("batten %s, compiler %s, one thread of batten's own\n", batten_version(), __VERSION__);
+  run_growth(ctx, most);
+  if (cases) {
+    run_random(ctx, cases, true);
+    run_random(ctx, cases, false);
+  }
+  batten_context_free(ctx);
+  return 0;
+}
