@@ -71,11 +71,15 @@ static void run_growth(batten_context *ctx, size_t most) {
 
 /* ---- random cases -------------------------------------------------------------------------------- */
 
+enum { MEASURES = 5 };
+
 typedef struct tally {
   size_t tried, proven, accepted, refused, unproven, failed; /* refused: the data have another shape */
   size_t worse, legs, below, right;                          /* right: as many inflections as the curve has */
   size_t done;
-  double *ratios, *reference, *seconds, *rows;
+  size_t noisy, exact;
+  double *ratios, *reference, *seconds, *rows; /* ratios: of noisy cases, two coordinates an unknown at least */
+  double *off;                                 /* of exact ones: root mean square distance, parts of the size */
 } tally;
 
 static batten_contour_options random_options(const contour_scene *s, uint64_t seed, bool given) {
@@ -109,7 +113,10 @@ static void count_fit(tally *t, uint64_t seed, const contour_rule *rule, const c
       t->worse++;
       break;
     }
-  t->ratios[t->done] = f->lsq_unconstrained > 0 ? f->lsq / f->lsq_unconstrained : 1;
+  if (rule->noise > 0 && s->count >= f->unknowns) /* else least squares nearly interpolate */
+    t->ratios[t->noisy++] = f->lsq / f->lsq_unconstrained;
+  else if (rule->noise == 0)
+    t->off[t->exact++] = f->rms / s->size;
   t->reference[t->done] = f->lsq_reference > 0 ? f->lsq / f->lsq_reference : 1;
   t->seconds[t->done] = seconds;
   t->rows[t->done] = f->rounds ? (double)f->rows_per_round[f->rounds - 1] : 0;
@@ -128,21 +135,24 @@ static void print_tally(tally *t) {
       "reference: %zu; as many inflections as the true curve: %zu\n",
       t->worse, t->legs, t->below, t->right);
   printf("| | least | 10 %% | median | 90 %% | 99 %% | most |\n|---|---|---|---|---|---|---|\n");
-  static const char *const names[4] = {"sum / sum without inequalities", "sum / sum of the reference", "seconds",
-                                       "inequalities of the last round"};
-  double *values[4] = {t->ratios, t->reference, t->seconds, t->rows};
-  for (int k = 0; k < 4; k++) {
+  static const char *const names[MEASURES] = {
+      "noise, two coordinates an unknown or more: sum / sum without inequalities",
+      "no noise: root mean square distance / size", "sum / sum of the reference", "seconds",
+      "inequalities of the last round"};
+  double *values[MEASURES] = {t->ratios, t->off, t->reference, t->seconds, t->rows};
+  const size_t counts[MEASURES] = {t->noisy, t->exact, t->done, t->done, t->done};
+  for (int k = 0; k < MEASURES; k++) {
     static const double at[6] = {0, 0.1, 0.5, 0.9, 0.99, 1};
     printf("| %s |", names[k]);
-    for (int q = 0; q < 6; q++) printf(" %.4g |", quantile(t->done, values[k], at[q]));
+    for (int q = 0; q < 6; q++) printf(" %.4g |", quantile(counts[k], values[k], at[q]));
     printf("\n");
   }
 }
 
 static void run_random(batten_context *ctx, size_t cases, bool given) {
   tally t = {.tried = cases};
-  double **values[4] = {&t.ratios, &t.reference, &t.seconds, &t.rows};
-  for (int k = 0; k < 4; k++) *values[k] = contour_scene_allocate(cases);
+  double **values[MEASURES] = {&t.ratios, &t.off, &t.reference, &t.seconds, &t.rows};
+  for (int k = 0; k < MEASURES; k++) *values[k] = contour_scene_allocate(cases);
   printf("\n## %zu random cases, inflections %s\n\n", cases, given ? "given" : "found");
   for (uint64_t seed = 0; seed < cases; seed++) {
     contour_rule rule = contour_rule_random(seed);
@@ -163,7 +173,7 @@ static void run_random(batten_context *ctx, size_t cases, bool given) {
     contour_scene_free(&s);
   }
   print_tally(&t);
-  for (int k = 0; k < 4; k++) free(*values[k]);
+  for (int k = 0; k < MEASURES; k++) free(*values[k]);
 }
 
 int main(int argc, char **argv) {

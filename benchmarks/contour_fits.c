@@ -116,7 +116,7 @@ static int write_scene(batten_context *ctx, const char *folder, const scene_rule
   bool good = false;
   snprintf(path, sizeof path, "%s/%s.scene", folder, r->name);
   if (contour_knots_place(ctx, &data, s.lengths, &o, &pieces, &breaks) == BATTEN_OK) {
-    double tolerance = (4 * r->rule.noise + 1e-4) * s.size;
+    double tolerance = (5 * r->rule.noise + 1e-4) * s.size;
     double head[HEAD] = {(double)s.count, DEGREE,    SMOOTHNESS, (double)pieces, (double)s.inflection_count,
                          s.sign,          tolerance, s.size};
     FILE *file = fopen(path, "wb");

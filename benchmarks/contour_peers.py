@@ -1,8 +1,8 @@
 """Curves through points of the plane by batten and by others, on the same points in the same run.
 
-Ways by least squares have the same parameters and knots: they differ by rounding and in time. Ways with a tolerance
-choose their knots themselves; those of batten have the wanted inflections too, and nobody else's do. Times are medians
-of several fits on one thread."""
+Ways by least squares have the same parameters and knots: they differ in time, by rounding, and by batten's tension of
+1e-12. Ways with a tolerance choose their knots themselves; those of batten have the wanted inflections too, and nobody
+else's do. Times are medians of several fits on one thread."""
 import argparse
 import csv
 import os
@@ -18,7 +18,7 @@ for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
 try:
     import numpy as np
     import scipy
-    from scipy import interpolate
+    from scipy import interpolate, spatial
 except ImportError as missing:
     print(f"the benchmark of curves beside peers needs NumPy and SciPy ({missing}); nothing was run")
     sys.exit(0)
@@ -124,16 +124,20 @@ def inflections(spline):
     return int(np.count_nonzero(sign[1:] != sign[:-1]))
 
 
-def distances(spline, points, parameters):
-    """To the curve, by Newton's steps from the parameters that do not lead away."""
-    t = parameters.copy()
+def distances(spline, points):
+    """To the curve: from the nearest of many places, by Newton's steps that do not lead away."""
+    breaks = np.unique(spline.t)
+    places = max(16, 4096 // len(breaks))
+    samples = np.concatenate([np.linspace(a, b, places, endpoint=False) for a, b in zip(breaks, breaks[1:])])
+    samples = np.append(samples, breaks[-1])
+    t = samples[spatial.cKDTree(spline(samples)).query(points)[1]]
     off = np.sum((spline(t) - points) ** 2, axis=1)
     for _ in range(6):
         e, first, second = spline(t) - points, spline(t, 1), spline(t, 2)
         gauss = np.sum(first * first, axis=1)
         newton = gauss + np.sum(e * second, axis=1)
         step = np.sum(e * first, axis=1) / np.where(newton > 0.1 * gauss, newton, gauss)
-        there = np.clip(t - step, 0, 1)
+        there = np.clip(t - step, breaks[0], breaks[-1])
         nearer = np.sum((spline(there) - points) ** 2, axis=1)
         t, off = np.where(nearer < off, there, t), np.minimum(off, nearer)
     return np.sqrt(off)
@@ -159,8 +163,8 @@ def run_scene(scene, ways, seconds, folder):
             notes.append(f"{way.label}: over {LIMIT} s")
             continue
         base = base or result.seconds
-        off = distances(result.spline, scene.points, scene.parameters)
-        truth = distances(result.spline, scene.truth, scene.parameters)
+        off = distances(result.spline, scene.points)
+        truth = distances(result.spline, scene.truth)
         row = dict(scene=scene.name, points=scene.count, way=way.label, coefficients=len(result.spline.c),
                    seconds=result.seconds, fits=result.fits, rms=np.sqrt(np.mean(off ** 2)), max_error=off.max(),
                    rms_truth=np.sqrt(np.mean(truth ** 2)), inflections=inflections(result.spline),
