@@ -1,12 +1,14 @@
 /* The reference curve: of the wanted shape, near the data.   [Juettler: contour data, section 2.2 (i)]
  *
  * Its degree is smoothness + 1, its breaks are those of the fit or some of them, and it is then written in the space
- * of the fit. Construction 2, least squares on fewer knots, is nearer to the data and tried first; construction 1,
- * prescribed directions of legs, always has the wanted signs. What counts in the end is whether linear inequalities
- * can enclose the curve: contour_rows_make is asked.
+ * of the fit. Construction 2 is least squares on fewer knots, construction 1 prescribes the directions of legs. What
+ * counts in the end is whether linear inequalities can enclose the curve: contour_rows_make is asked.
  *
- * A cubic span with inflections at both ends is straight, for its x'' is linear. There references have degree 4,
- * which the space of the fit must have. The paper does not speak of it. */
+ * Departures from the paper. It expects construction 2 to be nearer to the data, and keeps the other one for want of
+ * it. With directions that follow the data (reference_legs.c) neither is always nearer, and the nearer one leads to
+ * the better fit: both are made, and their sums compared. Where few spans turn far, references may have a higher
+ * degree than smoothness + 1, for more control points. A cubic span with inflections at both ends is straight, for
+ * its x'' is linear: there references begin with degree 4, which the space of the fit must have. */
 #include "reference_inner.h"
 
 #include "basis/refine.h"
@@ -101,17 +103,14 @@ batten_status contour_reference_find(batten_context *ctx, const contour_shape *s
     return batten_fail(ctx, BATTEN_E_INFEASIBLE,
                        "inflections: between two of them a cubic piece is straight; give a knot between them, or "
                        "degree 4");
-  double *control = batten_alloc_array(ctx, 2 * space->b.count, sizeof *control);
-  if (!control) return BATTEN_E_NOMEM;
-  bool found = false;
-  unsigned by = 2;
-  batten_status st = batten_progress(ctx, "reference", 0);
-  if (st >= 0 && construction != 1) st = reference_by_removal(ctx, &task, control, &found);
-  if (st >= 0 && construction != 2 && !found) {
-    by = 1;
-    st = reference_by_legs(ctx, &task, control, &found);
-  }
-  if (st >= 0 && !found)
+  size_t n = 2 * space->b.count;
+  double *by_legs = batten_alloc_array(ctx, n, sizeof *by_legs);
+  double *by_removal = batten_alloc_array(ctx, n, sizeof *by_removal);
+  double legs = INFINITY, removal = INFINITY;
+  batten_status st = by_legs && by_removal ? batten_progress(ctx, "reference", 0) : BATTEN_E_NOMEM;
+  if (st >= 0 && construction != 1) st = reference_by_removal(ctx, &task, by_removal, &removal);
+  if (st >= 0 && construction != 2) st = reference_by_legs(ctx, &task, by_legs, &legs);
+  if (st >= 0 && isinf(legs) && isinf(removal))
     st = batten_fail(ctx, BATTEN_E_INFEASIBLE, "no reference curve of the wanted shape: %s",
                      construction == 2  ? "knot removal does not find one; allow construction 1"
                      : ends_fixed(ends) ? "the fixed ends contradict the signs of curvature; free them or change the "
@@ -119,10 +118,11 @@ batten_status contour_reference_find(batten_context *ctx, const contour_shape *s
                                         : "runs between inflections turn too far for their number of spans; give "
                                           "more knots");
   if (st >= 0) {
-    memcpy(out->control, control, 2 * space->b.count * sizeof *control);
-    out->construction = by;
+    out->construction = legs < removal ? 1 : 2;
+    memcpy(out->control, legs < removal ? by_legs : by_removal, n * sizeof *out->control);
     st = batten_progress(ctx, "reference", 1);
   }
-  batten_free(ctx, control);
+  batten_free(ctx, by_removal);
+  batten_free(ctx, by_legs);
   return st < 0 ? st : BATTEN_OK;
 }

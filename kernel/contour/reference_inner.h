@@ -4,6 +4,10 @@
 
 #include "contour_inner.h"
 
+/* Where smoothness + 1 does not do, references may have so many degrees more, as far as the fit has them: they have
+ * more control points on the same knots. */
+enum { REFERENCE_MORE_DEGREES = 2 };
+
 typedef struct reference_task {
   const contour_shape *shape; /* of the fit, as is the space */
   const contour_space *space;
@@ -24,9 +28,9 @@ void reference_assess(const contour_shape *shape, const bspline *b, const double
 batten_status reference_accept(batten_context *ctx, const reference_task *task, const bspline *b,
                                const double *reference, double *control, bool *accepted);
 
-/* Construction 1 (reference_legs.c) and 2 (reference_removal.c): *found, and then control as above. Fail: NOMEM,
- * CANCELLED, TOO_LARGE. */
-batten_status reference_by_legs(batten_context *ctx, const reference_task *task, double *control, bool *found);
-batten_status reference_by_removal(batten_context *ctx, const reference_task *task, double *control, bool *found);
+/* Construction 1 (reference_legs.c) and 2 (reference_removal.c): control as above and its sum of squares, INFINITY
+ * when there is none. Fail: NOMEM, CANCELLED, TOO_LARGE. */
+batten_status reference_by_legs(batten_context *ctx, const reference_task *task, double *control, double *sum);
+batten_status reference_by_removal(batten_context *ctx, const reference_task *task, double *control, double *sum);
 
 #endif

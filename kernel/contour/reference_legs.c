@@ -28,12 +28,17 @@ static const double length_least = 0.02;
 
 /* What is tried in turn. */
 typedef struct attempt {
-  double turn_most;  /* of neighbours, in right angles times smoothness 2 ? 1 : 2 */
+  double turn_most;  /* of neighbours, in units of turn_unit */
   double turn_least; /* of a run, as a part of what the smoothed curve has there; and at least this, radians */
   double ratio;      /* lengths of neighbours differ at most by this times their turn */
 } attempt;
 static const attempt attempts[] = {{1.5, 0.05, 3}, {0.9, 0.05, 3},   {1.5, 0.1, 1},
                                    {0.9, 0.1, 1},  {1.5, 0.2, 0.25}, {0.9, 0.2, 0.25}};
+
+/* A degree higher gives more legs. That is tried when neighbours turn by more than so many right angles (smoothness
+ * 1: 1.2 of them), for their turn is limited. */
+static const double turn_many = 0.75;
+static double turn_unit(const contour_shape *s) { return pi / 2 * (s->smoothness == 1 ? 1.2 : 1); }
 
 typedef struct legs {
   const reference_task *task;
@@ -47,6 +52,8 @@ typedef struct legs {
   double *weights;     /* [count] */
   double *angles;      /* [count] those of the reference */
   double whole, speed; /* closed: turn of a round; mean length of x' */
+  double most;         /* of turns */
+  bool far, unclear;   /* see read_turns; unclear: it makes a difference */
 } legs;
 
 static double support(const bspline *b, size_t leg) { return b->knots[leg + b->degree + 1] - b->knots[leg + 1]; }
@@ -97,10 +104,10 @@ static void share_runs(legs *g) {
   }
 }
 
-static batten_status make_legs(batten_context *ctx, const reference_task *task, legs *g) {
+static batten_status make_legs(batten_context *ctx, const reference_task *task, unsigned degree, legs *g) {
   const contour_shape *s = task->shape;
   *g = (legs){.task = task};
-  batten_status st = contour_space_make(ctx, s, task->degree, s->smoothness == 2, task->ends, &g->space);
+  batten_status st = contour_space_make(ctx, s, degree, s->smoothness == 2, task->ends, &g->space);
   if (st < 0) return st;
   size_t all = g->space.b.count - 1;
   /* Closed: with smoothness 2 the first and the last leg are the same combination of their neighbours. */
@@ -125,21 +132,27 @@ static batten_status make_legs(batten_context *ctx, const reference_task *task, 
 
 /* ---- directions of a smoothed curve ------------------------------------------------------------- */
 
-/* Turns of a curve, and those to the wrong side as a part of all; INFINITY where legs turn back. */
+/* Turns of a curve, and those to the wrong side as a part of all. What seems to turn almost back, to the wrong side,
+ * is noise or, on few spans, more than half a turn to the right one: g->far says which it is taken for. */
 static double read_turns(legs *g, const bspline *b, const double *control) {
   double right = 0, wrong = 0;
   bool back = false;
+  g->most = 0;
   for (size_t i = 0; i < g->vertices; i++) {
     double u[2], v[2];
     leg_vector(b, control, g->first + i, u);
     leg_vector(b, control, i + 1 < g->count ? g->first + i + 1 : g->first, v);
     double turn = atan2(contour_cross(u, v), u[0] * v[0] + u[1] * v[1]);
+    bool almost = fabs(turn) > 0.7 * pi;
+    if (almost && g->far && g->signs[i] * turn < 0) turn += 2 * pi * g->signs[i];
     g->turns[i] = turn;
-    back = back || fabs(turn) > 0.8 * pi;
+    g->most = fmax(g->most, fabs(turn));
+    back = back || almost;
     if (g->signs[i] != 0) *(g->signs[i] * turn < 0 ? &wrong : &right) += fabs(turn);
   }
+  g->unclear = g->unclear || back;
   double part = wrong / fmax(right + wrong, 1e-300);
-  return back ? 2 + part : part;
+  return back && !g->far ? 2 + part : part;
 }
 
 static void read_angles(legs *g, const bspline *b, const double *control) {
@@ -165,7 +178,7 @@ static batten_status smooth_angles(batten_context *ctx, legs *g) {
   const reference_task *task = g->task;
   contour_space space = {0};
   contour_objective objective = {0};
-  batten_status st = contour_space_make(ctx, task->shape, task->degree, false, task->ends, &space);
+  batten_status st = contour_space_make(ctx, task->shape, g->space.b.degree, false, task->ends, &space);
   if (st < 0) return st;
   double *control = batten_alloc_array(ctx, 4 * space.b.count, sizeof *control), least = INFINITY;
   double *best = control ? control + 2 * space.b.count : NULL;
@@ -323,7 +336,7 @@ static void least_turns(const legs *g, const attempt *a, double *least) {
 /* Angles nearest to those wanted that turn to the right side: g->angles. */
 static batten_status find_angles(batten_context *ctx, legs *g, const attempt *a, bool *solved) {
   size_t n = g->count;
-  double most = a->turn_most * pi / 2 * (g->task->shape->smoothness == 1 ? 1.2 : 1);
+  double most = a->turn_most * turn_unit(g->task->shape);
   system rows = {0}, points = {0};
   double *work = batten_alloc_array(ctx, n, 3 * sizeof *work);
   batten_status st = work ? make_system(ctx, g->vertices, 2, &rows) : BATTEN_E_NOMEM;
@@ -467,24 +480,52 @@ done:
   return st;
 }
 
-batten_status reference_by_legs(batten_context *ctx, const reference_task *task, double *control, bool *found) {
-  legs g;
-  double *reference = NULL;
-  *found = false;
-  batten_status st = make_legs(ctx, task, &g);
-  if (st >= 0) st = smooth_angles(ctx, &g);
-  if (st >= 0) {
-    reference = batten_alloc_array(ctx, 2 * g.space.b.count, sizeof *reference);
-    if (!reference) st = BATTEN_E_NOMEM;
-  }
-  for (size_t k = 0; st >= 0 && !*found && k < sizeof attempts / sizeof *attempts; k++) {
+/* The first attempt that inequalities accept: into control, where it is nearer to the data than *sum, which becomes
+ * its own. */
+static batten_status try_attempts(batten_context *ctx, legs *g, double *control, double *sum) {
+  const reference_task *task = g->task;
+  size_t n = 2 * task->space->b.count;
+  double *reference = batten_alloc_array(ctx, 2 * g->space.b.count, sizeof *reference);
+  double *trial = batten_alloc_array(ctx, n, sizeof *trial);
+  batten_status st = reference && trial ? BATTEN_OK : BATTEN_E_NOMEM;
+  bool accepted = false;
+  for (size_t k = 0; st >= 0 && !accepted && k < sizeof attempts / sizeof *attempts; k++) {
     bool solved = false;
     st = batten_progress(ctx, "reference", 0.5 + 0.05 * (double)k);
-    if (st >= 0) st = find_angles(ctx, &g, &attempts[k], &solved);
-    if (st >= 0 && solved) st = find_lengths(ctx, &g, &attempts[k], reference, &solved);
-    if (st >= 0 && solved) st = reference_accept(ctx, task, &g.space.b, reference, control, found);
+    if (st >= 0) st = find_angles(ctx, g, &attempts[k], &solved);
+    if (st >= 0 && solved) st = find_lengths(ctx, g, &attempts[k], reference, &solved);
+    if (st >= 0 && solved) st = reference_accept(ctx, task, &g->space.b, reference, trial, &accepted);
   }
+  if (st >= 0 && accepted) {
+    double own = contour_sum(&task->space->b, trial, task->data, task->parameters);
+    if (own < *sum) {
+      *sum = own;
+      memcpy(control, trial, n * sizeof *control);
+    }
+  }
+  batten_free(ctx, trial);
   batten_free(ctx, reference);
-  free_legs(ctx, &g);
+  return st;
+}
+
+batten_status reference_by_legs(batten_context *ctx, const reference_task *task, double *control, double *sum) {
+  batten_status st = BATTEN_OK;
+  unsigned last = task->degree + REFERENCE_MORE_DEGREES;
+  bool enough = false;
+  *sum = INFINITY;
+  for (unsigned degree = task->degree; st >= 0 && !enough && degree <= last; degree++) {
+    if (degree > task->shape->degree) break;
+    legs g;
+    st = make_legs(ctx, task, degree, &g);
+    double most = 0;
+    for (int far = 0; st >= 0 && far < 2 && (far == 0 || g.unclear); far++) {
+      g.far = far;
+      st = smooth_angles(ctx, &g);
+      if (st >= 0) st = try_attempts(ctx, &g, control, sum);
+      most = fmax(most, g.most);
+    }
+    enough = *sum < INFINITY && !g.unclear && most < turn_many * turn_unit(task->shape);
+    free_legs(ctx, &g);
+  }
   return st;
 }

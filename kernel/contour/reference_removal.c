@@ -35,6 +35,7 @@ typedef struct removal {
   bool *drop;            /* [spans + 1] */
   double *quality;       /* [spans] */
   candidate *candidates; /* [spans + 1] */
+  unsigned degree;
   double tension, sine;
 } removal;
 
@@ -43,7 +44,7 @@ static contour_shape subset(const removal *r) {
   s.spans = r->spans;
   s.breaks = r->breaks;
   s.signs = r->signs;
-  s.degree = r->task->degree;
+  s.degree = r->degree;
   return s;
 }
 
@@ -87,7 +88,7 @@ static int by_cost(const void *x, const void *y) {
 static bool removable(const removal *r, const contour_shape *s, size_t i, size_t spans_left) {
   if (i == 0 || i == s->spans || contour_inflection(s, i)) return false;
   if (s->closed && spans_left <= CLOSED_SPANS) return false;
-  if (s->smoothness == 1 || r->task->degree > 3) return true;
+  if (s->smoothness == 1 || r->degree > 3) return true;
   size_t a = i, b = i;
   do a--;
   while (r->drop[a]);
@@ -127,7 +128,7 @@ static batten_status try_subset(batten_context *ctx, removal *r, double *control
   contour_space space = {0};
   contour_objective objective = {0};
   double *fit = NULL;
-  batten_status st = contour_space_make(ctx, &s, task->degree, s.smoothness == 2, task->ends, &space);
+  batten_status st = contour_space_make(ctx, &s, r->degree, s.smoothness == 2, task->ends, &space);
   if (st == BATTEN_E_INVALID) { /* too few spans for the ends */
     *stuck = true;
     return BATTEN_OK;
@@ -166,29 +167,41 @@ done:
   return st;
 }
 
-batten_status reference_by_removal(batten_context *ctx, const reference_task *task, double *control, bool *found) {
-  size_t n = task->shape->spans;
-  removal r = {.task = task, .spans = n, .tension = task->tension, .sine = sine_first};
-  r.kept = batten_alloc_array(ctx, n + 1, sizeof *r.kept);
-  r.breaks = batten_alloc_array(ctx, n + 1, sizeof *r.breaks);
-  r.signs = batten_alloc_array(ctx, n + 1, sizeof *r.signs);
-  r.drop = batten_alloc_array(ctx, n + 1, sizeof *r.drop);
-  r.quality = batten_alloc_array(ctx, n + 1, sizeof *r.quality);
-  r.candidates = batten_alloc_array(ctx, n + 1, sizeof *r.candidates);
-  bool all = r.kept && r.breaks && r.signs && r.drop && r.quality && r.candidates, stuck = false;
+/* All knots, and the first tension. */
+static void start(removal *r, unsigned degree) {
+  r->degree = degree;
+  r->spans = r->task->shape->spans;
+  r->tension = r->task->tension;
+  r->sine = sine_first;
+  for (size_t i = 0; i <= r->spans; i++) {
+    r->kept[i] = i;
+    r->drop[i] = false;
+  }
+  shrink(r);
+}
+
+batten_status reference_by_removal(batten_context *ctx, const reference_task *task, double *control, double *sum) {
+  size_t n = task->shape->spans + 1;
+  removal r = {.task = task};
+  r.kept = batten_alloc_array(ctx, n, sizeof *r.kept);
+  r.breaks = batten_alloc_array(ctx, n, sizeof *r.breaks);
+  r.signs = batten_alloc_array(ctx, n, sizeof *r.signs);
+  r.drop = batten_alloc_array(ctx, n, sizeof *r.drop);
+  r.quality = batten_alloc_array(ctx, n, sizeof *r.quality);
+  r.candidates = batten_alloc_array(ctx, n, sizeof *r.candidates);
+  bool all = r.kept && r.breaks && r.signs && r.drop && r.quality && r.candidates, found = false;
   batten_status st = all ? BATTEN_OK : BATTEN_E_NOMEM;
-  *found = false;
-  if (st >= 0) {
-    for (size_t i = 0; i <= n; i++) {
-      r.kept[i] = i;
-      r.drop[i] = false;
+  *sum = INFINITY;
+  for (unsigned degree = task->degree; st >= 0 && !found; degree++) {
+    if (degree > task->shape->degree || degree > task->degree + REFERENCE_MORE_DEGREES) break;
+    bool stuck = false;
+    start(&r, degree);
+    for (int fit = 0; st >= 0 && !found && !stuck && fit < FITS; fit++) {
+      st = batten_progress(ctx, "reference", 0.5 * fit / FITS);
+      if (st >= 0) st = try_subset(ctx, &r, control, &found, &stuck);
     }
-    shrink(&r);
   }
-  for (int fit = 0; st >= 0 && !*found && !stuck && fit < FITS; fit++) {
-    st = batten_progress(ctx, "reference", 0.5 * fit / FITS);
-    if (st >= 0) st = try_subset(ctx, &r, control, found, &stuck);
-  }
+  if (st >= 0 && found) *sum = contour_sum(&task->space->b, control, task->data, task->parameters);
   batten_free(ctx, r.candidates);
   batten_free(ctx, r.quality);
   batten_free(ctx, r.drop);
