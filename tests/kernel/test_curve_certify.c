@@ -1,174 +1,6 @@
 /* batten_curve_certify: curves of known shape are certified, curves with a wrong sign are not, and margins are those
- * that dense sampling in long double finds, by de Boor's algorithm on the curve's own derivatives. */
-#include <float.h>
-
-#include "basis/refine.h"
-#include "curve_case.h"
-
-/* ---- an oracle ------------------------------------------------------------------------------------ */
-
-/* x', x'' at t on the span [u_mu, u_mu+1], by parts of the span; degree >= 2. */
-static void oracle_jet(const curve_case *c, size_t mu, long double t, long double jet[2][2]) {
-  long double p[10][2], h = (long double)c->knots[mu + 1] - c->knots[mu];
-  unsigned d = c->degree;
-  for (unsigned j = 0; j <= d; j++)
-    for (int x = 0; x < 2; x++) p[j][x] = c->control[mu - d + j][x];
-  for (unsigned order = 1; order <= 2; order++) {
-    unsigned m = d + 1 - order; /* of what is differentiated */
-    for (unsigned j = 0; j < m; j++)
-      for (int x = 0; x < 2; x++)
-        p[j][x] = m * h * (p[j + 1][x] - p[j][x]) / ((long double)c->knots[mu + j + 1] - c->knots[mu - m + j + 1]);
-    long double w[10][2];
-    memcpy(w, p, sizeof w);
-    for (unsigned round = 1; round <= m - 1; round++)
-      for (unsigned j = 0; j + round <= m - 1; j++) {
-        long double left = c->knots[mu - (m - 1) + j + round], right = c->knots[mu + j + 1];
-        long double part = (t - left) / (right - left);
-        for (int x = 0; x < 2; x++) w[j][x] = (1 - part) * w[j][x] + part * w[j + 1][x];
-      }
-    for (int x = 0; x < 2; x++) jet[order - 1][x] = w[0][x];
-  }
-}
-
-/* [x', x''], and by |x'|^3: the curvature. */
-static long double oracle_bend(const curve_case *c, size_t mu, long double t, long double *curvature) {
-  long double jet[2][2];
-  oracle_jet(c, mu, t, jet);
-  long double bend = jet[0][0] * jet[1][1] - jet[0][1] * jet[1][0], speed = hypotl(jet[0][0], jet[0][1]);
-  if (curvature) *curvature = bend / (speed * speed * speed);
-  return bend;
-}
-
-static size_t next_span(const curve_case *c, size_t mu) {
-  size_t n = curve_case_count(c);
-  do mu++;
-  while (mu < n && !(c->knots[mu] < c->knots[mu + 1]));
-  return mu;
-}
-
-enum { SAMPLES = 64, MOST = 200 };
-
-/* All changes of sign inside spans, by samples and bisection; false where they are not clear, or also at knots. */
-static bool oracle_inflections(const curve_case *c, size_t *count, double *at, int *sign) {
-  *count = 0;
-  int before = 0;
-  *sign = 1;
-  for (size_t mu = c->degree; mu < curve_case_count(c); mu = next_span(c, mu)) {
-    long double from = c->knots[mu], to = c->knots[mu + 1], last = from;
-    for (int i = 0; i <= SAMPLES; i++) {
-      long double t = from + (to - from) * i / SAMPLES, bend = oracle_bend(c, mu, t, NULL);
-      int now = bend < 0 ? -1 : 1;
-      if (before == 0) *sign = now;
-      if (before && now != before) {
-        if (i == 0) return false;
-        long double a = last, b = t;
-        for (int k = 0; k < 70; k++) {
-          long double middle = (a + b) / 2;
-          if ((oracle_bend(c, mu, middle, NULL) < 0 ? -1 : 1) == now)
-            b = middle;
-          else
-            a = middle;
-        }
-        if (*count == MOST) return false;
-        at[(*count)++] = (double)a;
-      }
-      before = now;
-      last = t;
-    }
-  }
-  return true;
-}
-
-/* The least of sign curvature / rho at samples, rho as in the header; dense near the least. */
-static long double oracle_margin(const curve_case *c, int sign, size_t count, const double *inflections,
-                                 double error) {
-  long double least = INFINITY;
-  size_t next = 0;
-  if (count && inflections[0] <= c->knots[0]) next = 1; /* of a closed curve, there the sign is the one after */
-  for (size_t mu = c->degree; mu < curve_case_count(c); mu = next_span(c, mu)) {
-    long double from = c->knots[mu], to = c->knots[mu + 1], h = to - from, most = h * 1e-6L;
-    for (int i = 0; i <= 4 * SAMPLES; i++) {
-      long double t = from + h * i / (4 * SAMPLES), curvature, rho = 1, near = INFINITY;
-      size_t passed = next;
-      while (passed < count && inflections[passed] < t) passed++;
-      for (size_t k = 0; k < count; k++) {
-        long double away = fabsl(t - inflections[k]);
-        if (inflections[k] >= from - most && inflections[k] <= to + most && away < near) near = away;
-      }
-      if (near < INFINITY) rho = (near - error) / h;
-      if (!(rho > 0)) continue;
-      /* Jumps: near rho may be too small a measure; callers know. */
-      int now = (passed - next) % 2 ? -sign : sign;
-      oracle_bend(c, mu, t, &curvature);
-      if (now * curvature / rho < least) least = now * curvature / rho;
-    }
-  }
-  return least;
-}
-
-/* ---- curves ---------------------------------------------------------------------------------------- */
-
-static batten_curve_shape certify(batten_context *ctx, const curve_case *c, int sign, size_t count,
-                                  const double *inflections) {
-  batten_curve *curve = curve_case_make(ctx, c);
-  batten_curve_shape_options o = batten_curve_shape_options_default();
-  batten_curve_shape shape = {.certified = -1};
-  o.sign = sign;
-  o.inflection_count = count;
-  o.inflections = inflections;
-  if (batten_curve_certify(ctx, curve, &o, &shape) < 0) t_line(false, "certify: %s", batten_error(ctx));
-  batten_curve_free(curve);
-  return shape;
-}
-
-/* Control points from the differences q_j of x', that is legs along their knot intervals. */
-static void from_tangents(curve_case *c, const double (*q)[2]) {
-  size_t n = curve_case_count(c);
-  for (size_t j = 0; j + 1 < n; j++)
-    for (int x = 0; x < 2; x++)
-      c->control[j + 1][x] = c->control[j][x] + q[j][x] * (c->knots[j + c->degree + 1] - c->knots[j + 1]) / c->degree;
-}
-
-/* x' with control vectors of turning directions: variation diminishing makes the curve bend one way. `least`: spans
- * differ up to 1 / least in length. */
-static curve_case convex_case(uint64_t *state, unsigned degree, size_t breaks, unsigned fold, double turn,
-                              double least) {
-  curve_case c = {.degree = degree};
-  double at = 0, q[CASE_POINTS][2];
-  for (unsigned k = 0; k <= degree; k++) c.knots[c.knot_count++] = 0;
-  for (size_t s = 0; s < breaks; s++) {
-    at += pow(least, t_uniform(state));
-    unsigned times = 1 + (unsigned)(t_random(state) % fold);
-    for (unsigned k = 0; k < times; k++) c.knots[c.knot_count++] = at;
-  }
-  at += pow(least, t_uniform(state));
-  for (unsigned k = 0; k <= degree; k++) c.knots[c.knot_count++] = at;
-  size_t n = curve_case_count(&c);
-  double angle = 6 * t_uniform(state), step = turn / degree;
-  for (size_t j = 0; j + 1 < n; j++) {
-    double size = 0.5 + t_uniform(state);
-    q[j][0] = size * cos(angle);
-    q[j][1] = size * sin(angle);
-    angle += step * (0.1 + 0.9 * t_uniform(state));
-  }
-  from_tangents(&c, (const double(*)[2])q);
-  return c;
-}
-
-static curve_case transformed(const curve_case *c, bool mirror, bool reverse, int exponent) {
-  curve_case out = *c;
-  size_t n = curve_case_count(c);
-  for (size_t i = 0; i < n; i++) {
-    const double *p = c->control[reverse ? n - 1 - i : i];
-    out.control[i][0] = ldexp(p[0], exponent);
-    out.control[i][1] = ldexp(mirror ? -p[1] : p[1], exponent);
-  }
-  for (size_t k = 0; k < c->knot_count && reverse; k++)
-    out.knots[k] = c->knots[0] + (c->knots[c->knot_count - 1] - c->knots[c->knot_count - 1 - k]);
-  return out;
-}
-
-/* ---- tests ----------------------------------------------------------------------------------------- */
+ * that dense sampling in long double finds. */
+#include "curve_oracle.h"
 
 static void test_convex(batten_context *ctx) {
   uint64_t state = 1;
@@ -182,7 +14,7 @@ static void test_convex(batten_context *ctx) {
       c = transformed(&c, i % 2, i % 7 == 3, i % 11 == 4 ? 300 : i % 11 == 5 ? -300 : 0);
       int sign = (i % 2 != 0) != (i % 7 == 3) ? -1 : 1;
       batten_curve_shape shape = certify(ctx, &c, i % 3 ? sign : 0, 0, NULL);
-      long double margin = oracle_margin(&c, sign, 0, NULL, 0);
+      long double margin = oracle_margin(&c, sign, 0, NULL, 0, false);
       if (!shape.certified) refused++;
       if (shape.certified && (shape.sign != sign || shape.margin_min > margin * (1 + 1e-12L))) wrong++;
       if (shape.certified && shape.margin_min < 0.85L * margin) {
@@ -214,7 +46,7 @@ static void test_random(batten_context *ctx) {
       continue;
     }
     error = fmax(error, shape.inflection_error);
-    long double margin = oracle_margin(&c, sign, count, at, shape.inflection_error);
+    long double margin = oracle_margin(&c, sign, count, at, shape.inflection_error, false);
     if (shape.margin_min > margin * (1 + 1e-9L) || shape.sign != sign) wrong++;
     /* Asked for another shape. */
     if (certify(ctx, &c, -sign, count, at).certified) believed++;
@@ -245,10 +77,195 @@ static void test_random(batten_context *ctx) {
   T_CHECK(believed == 0, "%zu other shapes: %zu certified", changed, believed);
 }
 
+/* How much of a displacement of one control point is certified, and what the oracle says a little beyond. */
+static long double least_bend(const curve_case *c, int sign) {
+  long double least = INFINITY;
+  for (size_t mu = c->degree; mu < curve_case_count(c); mu = next_span(c, mu)) {
+    long double from = c->knots[mu], h = c->knots[mu + 1] - from, best = from, span_least = INFINITY;
+    for (int i = 0; i <= 256; i++) {
+      long double t = from + h * i / 256, bend = sign * oracle_bend(c, mu, t, NULL);
+      if (bend < span_least) {
+        span_least = bend;
+        best = t;
+      }
+    }
+    /* Golden sections around the least sample. */
+    long double a = fmaxl(best - h / 256, from), b = fminl(best + h / 256, from + h), g = 0.6180339887498948482L;
+    for (int k = 0; k < 80; k++) {
+      long double u = b - g * (b - a), v = a + g * (b - a);
+      if (sign * oracle_bend(c, mu, u, NULL) < sign * oracle_bend(c, mu, v, NULL))
+        b = v;
+      else
+        a = u;
+    }
+    least = fminl(least, fminl(span_least, sign * oracle_bend(c, mu, (a + b) / 2, NULL)));
+  }
+  return least;
+}
+
+static void test_sharpness(batten_context *ctx) {
+  uint64_t state = 31;
+  size_t wrong = 0, nuisance = 0, tried = 0, critical = 0;
+  for (int i = 0; i < 120; i++) {
+    unsigned degree = 2 + (unsigned)(i % 5);
+    curve_case c = convex_case(&state, degree, t_random(&state) % 4, 1, 2, 0.3), moved = c;
+    size_t j = t_random(&state) % curve_case_count(&c);
+    double way[2] = {t_uniform(&state) - 0.5, t_uniform(&state) - 0.5}, low = 0, high = 100;
+    for (int k = 0; k < 60; k++) {
+      double middle = 0.5 * low + 0.5 * high;
+      for (int x = 0; x < 2; x++) moved.control[j][x] = c.control[j][x] + middle * way[x];
+      if (certify(ctx, &moved, 1, 0, NULL).certified)
+        low = middle;
+      else
+        high = middle;
+    }
+    for (int x = 0; x < 2; x++) moved.control[j][x] = c.control[j][x] + low * way[x];
+    bool holds = least_bend(&moved, 1) > 0, reached = low < 99;
+    for (int x = 0; x < 2; x++) moved.control[j][x] = c.control[j][x] + low * (1 + 1e-11) * way[x];
+    /* x' may vanish before a sign is wrong. */
+    bool fails = !reached || !(least_bend(&moved, 1) > 0) || !certify(ctx, &moved, 1, 0, NULL).certified;
+    for (int x = 0; x < 2; x++) moved.control[j][x] = c.control[j][x] + low * (1 + 1e-9) * way[x];
+    bool bad = !(least_bend(&moved, 1) > 0);
+    tried++;
+    wrong += !holds || !fails;
+    nuisance += !bad && reached;
+    critical += reached;
+  }
+  T_CHECK(wrong == 0, "%zu curves, %zu just about to bend the other way: %zu certified wrongly", tried, critical,
+          wrong);
+  T_RATIO((double)nuisance, 0.1 * (double)tried, "refused although good 1e-9 further on");
+}
+
+static void test_edges(batten_context *ctx) {
+  /* Parabolas that are almost straight: the sign is that of the last digits, or none. */
+  size_t wrong = 0, least = 0;
+  for (int k = -200; k <= 200; k++) {
+    curve_case c = {.degree = 2,
+                    .knot_count = 6,
+                    .knots = {0, 0, 0, 1, 1, 1},
+                    .control = {{0, 0.5}, {1, 0.75}, {2, 1 + k * 0x1p-52}}};
+    batten_curve_shape shape = certify(ctx, &c, k < 0 ? -1 : 1, 0, NULL);
+    wrong += shape.certified && k == 0;
+    wrong += certify(ctx, &c, k < 0 ? 1 : -1, 0, NULL).certified != 0;
+    if (shape.certified && (!least || (size_t)abs(k) < least)) least = (size_t)abs(k);
+  }
+  T_CHECK(wrong == 0 && least > 0 && least <= 64,
+          "almost straight: %zu wrong, proven from %zu units in the last place", wrong, least);
+  /* (s^2, s^3): its [x', x''] is 6 s^2, and x' vanishes with it. */
+  curve_case cusp = {.degree = 3,
+                     .knot_count = 8,
+                     .knots = {-1, -1, -1, -1, 1, 1, 1, 1},
+                     .control = {{1, -1}, {-1 / 3.0, 1}, {-1 / 3.0, -1}, {1, 1}}};
+  double at = 0;
+  bool any = false;
+  for (int sign = -1; sign <= 1; sign++)
+    any = any || certify(ctx, &cusp, sign, 0, NULL).certified || certify(ctx, &cusp, sign, 1, &at).certified;
+  T_CHECK(!any, "a cusp is not certified in any way");
+  /* (s, s^4): flat at 0, where it bends the same way on both sides. (s, s^5): an inflection of a higher order. */
+  curve_case flat = {.degree = 4,
+                     .knot_count = 10,
+                     .knots = {-1, -1, -1, -1, -1, 1, 1, 1, 1, 1},
+                     .control = {{-1, 1}, {-0.5, -1}, {0, 1}, {0.5, -1}, {1, 1}}};
+  T_CHECK(!certify(ctx, &flat, 1, 0, NULL).certified && !certify(ctx, &flat, 1, 1, &at).certified, "a flat point");
+  curve_case line = {.degree = 1, .knot_count = 5, .knots = {0, 0, 1, 2, 2}, .control = {{0, 0}, {1, 0}, {1, 1}}};
+  batten_curve_shape shape = certify(ctx, &line, 1, 0, NULL);
+  T_CHECK(!shape.certified && shape.margin_min == 0, "degree 1 does not bend");
+  curve_case point = {.degree = 3, .knot_count = 8, .knots = {0, 0, 0, 0, 1, 1, 1, 1}};
+  shape = certify(ctx, &point, 0, 0, NULL);
+  T_CHECK(!shape.certified && shape.margin_min == 0, "a point neither");
+  /* Half a circle, nearly: by hand, the curvature of [x', x''] = 36, |x'| = 3 at its ends. */
+  double k = 4 * (sqrt(2) - 1) / 3;
+  curve_case quarter = {
+      .degree = 3, .knot_count = 8, .knots = {0, 0, 0, 0, 2, 2, 2, 2}, .control = {{1, 0}, {1, k}, {k, 1}, {0, 1}}};
+  shape = certify(ctx, &quarter, 0, 0, NULL);
+  long double margin = oracle_margin(&quarter, 1, 0, NULL, 0, false);
+  T_CHECK(shape.certified && shape.sign == 1 && shape.margin_min <= margin && shape.margin_min >= 0.9L * margin,
+          "a quarter of a circle: margin %.6g of %.6Lg", shape.margin_min, margin);
+}
+
+/* Units of points and of parameters are powers of two: the same digits. */
+static void test_units(batten_context *ctx) {
+  uint64_t state = 2;
+  curve_case c = convex_case(&state, 4, 3, 1, 2, 0.3);
+  batten_curve_shape shape = certify(ctx, &c, 1, 0, NULL);
+  for (int e = -900; e <= 900; e += 300) {
+    curve_case d = transformed(&c, false, false, e);
+    for (size_t k = 0; k < d.knot_count; k++) d.knots[k] = ldexp(d.knots[k], -e);
+    batten_curve_shape other = certify(ctx, &d, 1, 0, NULL);
+    T_CHECK(other.certified && other.margin_min == ldexp(shape.margin_min, -e) && other.pieces == shape.pieces,
+            "the same in units of 2^%d: margin %g", e, other.margin_min);
+  }
+}
+
+static batten_status call(batten_context *ctx, void *arg) {
+  batten_curve_form form = curve_case_form(arg);
+  batten_curve *curve = NULL;
+  batten_curve_shape shape;
+  batten_status st = batten_curve_create(ctx, &form, &curve);
+  if (st < 0) return st;
+  st = batten_curve_certify(ctx, curve, NULL, &shape);
+  batten_curve_free(curve);
+  return st;
+}
+
+static void test_bad(batten_context *ctx) {
+  uint64_t state = 9;
+  curve_case c = convex_case(&state, 3, 3, 1, 2, 0.3);
+  batten_curve *curve = curve_case_make(ctx, &c);
+  batten_curve_shape shape = {.sign = 7};
+  batten_curve_shape_options o = batten_curve_shape_options_default(), bad = o;
+  double at[3] = {0.5, 0.25, 0};
+  T_CHECK(batten_curve_certify(NULL, curve, &o, &shape) == BATTEN_E_INVALID, "no context");
+  T_STATUS(batten_curve_certify(ctx, NULL, &o, &shape), BATTEN_E_INVALID, ctx, "curve: NULL");
+  T_STATUS(batten_curve_certify(ctx, curve, &o, NULL), BATTEN_E_INVALID, ctx, "out: NULL");
+  bad.struct_size = 0;
+  T_STATUS(batten_curve_certify(ctx, curve, &bad, &shape), BATTEN_E_INVALID, ctx, "struct_size");
+  bad = o;
+  bad.sign = 2;
+  T_STATUS(batten_curve_certify(ctx, curve, &bad, &shape), BATTEN_E_INVALID, ctx, "opt.sign: 2");
+  bad = o;
+  bad.slack = 0;
+  T_STATUS(batten_curve_certify(ctx, curve, &bad, &shape), BATTEN_E_INVALID, ctx, "opt.slack: 0");
+  bad.slack = NAN;
+  T_STATUS(batten_curve_certify(ctx, curve, &bad, &shape), BATTEN_E_INVALID, ctx, "opt.slack: nan");
+  bad = o;
+  bad.depth_max = 51;
+  T_STATUS(batten_curve_certify(ctx, curve, &bad, &shape), BATTEN_E_INVALID, ctx, "opt.depth_max: 51");
+  bad = o;
+  bad.inflection_count = 2;
+  T_STATUS(batten_curve_certify(ctx, curve, &bad, &shape), BATTEN_E_INVALID, ctx, "opt.inflections: NULL");
+  bad.inflections = at;
+  T_STATUS(batten_curve_certify(ctx, curve, &bad, &shape), BATTEN_E_INVALID, ctx, "opt.inflections[1]: 0.25");
+  at[0] = 0;
+  T_STATUS(batten_curve_certify(ctx, curve, &bad, &shape), BATTEN_E_INVALID, ctx, "opt.inflections[0]: 0");
+  at[0] = NAN;
+  T_STATUS(batten_curve_certify(ctx, curve, &bad, &shape), BATTEN_E_INVALID, ctx, "opt.inflections[0]: nan");
+  T_CHECK(shape.sign == 7, "the result is untouched");
+  bad = o;
+  bad.depth_max = 0;
+  T_OK(batten_curve_certify(ctx, curve, &bad, &shape), ctx);
+  T_CHECK(shape.depth == 0, "no bisections: certified %d, margin %g", shape.certified, shape.margin_min);
+  batten_curve_free(curve);
+  curve_case closed = {
+      .degree = 2, .knot_count = 6, .knots = {0, 0, 0, 1, 1, 1}, .closed = 1, .control = {{0, 0}, {1, 1}, {0, 0}}};
+  curve = curve_case_make(ctx, &closed);
+  at[0] = 0;
+  bad = o;
+  bad.inflection_count = 1;
+  bad.inflections = at;
+  T_STATUS(batten_curve_certify(ctx, curve, &bad, &shape), BATTEN_E_INVALID, ctx, "of a closed curve it is even");
+  batten_curve_free(curve);
+  t_fail_every_allocation("batten_curve_certify", call, &c);
+}
+
 int main(void) {
   batten_context *ctx = t_context(NULL, NULL, 1);
   test_convex(ctx);
   test_random(ctx);
+  test_sharpness(ctx);
+  test_edges(ctx);
+  test_units(ctx);
+  test_bad(ctx);
   batten_context_free(ctx);
   return t_done();
 }
