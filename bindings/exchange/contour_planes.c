@@ -7,6 +7,8 @@
  * does. */
 #include "contours.h"
 
+#include "base/checked.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -117,9 +119,14 @@ static batten_plane plane_with(const double normal[3], const double through[3]) 
   return plane;
 }
 
+static batten_status fail_size(bx_reader *r, size_t which) {
+  return batten_fail(r->ctx, BATTEN_E_FORMAT, "%s: contours[%zu]: its coordinates are beyond a double; scale it",
+                     bx_short_path(r->path), which);
+}
+
 static batten_status fit_plane(bx_reader *r, size_t which, const double (*points)[3], size_t count, const spread *s,
                                double (*out)[2], batten_plane *plane) {
-  double normal[3], middle[3], worst = 0, lower = INFINITY, upper = -INFINITY;
+  double normal[3], middle[3], lower = INFINITY, upper = -INFINITY;
   best_normal(points, count, s, normal);
   for (size_t i = 0; i < count; i++) {
     double x[3];
@@ -128,7 +135,7 @@ static batten_status fit_plane(bx_reader *r, size_t which, const double (*points
     upper = fmax(upper, dot(normal, x));
   }
   for (int k = 0; k < 3; k++) middle[k] = s->lower[k] + (lower + upper) / 2 * normal[k];
-  worst = (upper - lower) / 2;
+  double worst = (upper - lower) / 2;
   if (!(worst <= flat * s->size))
     return batten_fail(r->ctx, BATTEN_E_FORMAT,
                        "%s: contours[%zu]: its points lie up to %.3g from their best plane, at most %.3g is taken; "
@@ -137,6 +144,8 @@ static batten_status fit_plane(bx_reader *r, size_t which, const double (*points
   *plane = plane_with(normal, middle);
   for (size_t i = 0; i < count; i++)
     for (int k = 0; k < 2; k++) out[i][k] = dot(plane->axes[k], points[i]);
+  if (batten_first_nonfinite(2 * count, out[0]) < 2 * count || batten_first_nonfinite(3, plane->origin) < 3)
+    return fail_size(r, which);
   return BATTEN_OK;
 }
 
@@ -154,9 +163,7 @@ batten_status bx_find_planes(bx_reader *r, size_t count, const size_t *starts, c
   batten_status st = BATTEN_OK;
   for (size_t c = 0; c < count; c++) {
     spread s = spread_of((const double(*)[3])points + starts[c], starts[c + 1] - starts[c]);
-    if (!isfinite(s.size))
-      return batten_fail(r->ctx, BATTEN_E_FORMAT, "%s: contours[%zu]: its extent is beyond a double; scale it",
-                         bx_short_path(r->path), c);
+    if (!isfinite(s.size)) return fail_size(r, c);
     for (int k = 0; k < 3; k++) all[k] = all[k] && is_constant(&s, k);
   }
   int shared = constant_of(all);

@@ -215,7 +215,9 @@ static void test_refused(batten_context *ctx) {
       {"x y contour\ncontour 1\n1 2 3\n", "a.txt:3: a column 'contour' and lines 'contour N' at once"},
       {"0 0 0\n1 0 1\n0 1 1\n0 0 1\n\n1 2 3\n",
        "a.txt: contours[0]: its points lie up to 0.289 from their best plane, at most 1e-06 is taken; part"},
-      {"-1e308 0 0\n1e308 0 0\n", "a.txt: contours[0]: its extent is beyond a double"},
+      {"-1e308 0 0\n1e308 0 0\n", "a.txt: contours[0]: its coordinates are beyond a double; scale it"},
+      {"1.7e308 1.7e308 1.7e308\n1.7e308 1.6e308 1.6e308\n1.6e308 1.7e308 1.6e308\n",
+       "a.txt: contours[0]: its coordinates are beyond a double"},
   };
   for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
     batten_contours c = {.count = 77};

@@ -34,7 +34,8 @@ static void write_all(batten_context *ctx, scratch *s, const batten_mesh *mesh, 
   snprintf(name, sizeof name, "carrier-%d.json", which);
   T_OK(batten_save_carrier(ctx, carrier, scratch_file(s, name)), ctx);
   double g[] = {0.1, -2.5e-7}, upper[] = {1.75, INFINITY};
-  batten_qp_file qp = {.problem = {.struct_size = sizeof qp.problem, .n = 2, .g = g, .constant = 0.3, .x_upper = upper}};
+  batten_qp_file qp = {
+      .problem = {.struct_size = sizeof qp.problem, .n = 2, .g = g, .constant = 0.3, .x_upper = upper}};
   for (size_t i = 0; i < 2; i++) {
     snprintf(name, sizeof name, "qp-%d.%s", which, i ? "json" : "qps");
     T_OK(batten_write_qp(ctx, &qp, scratch_file(s, name)), ctx);
@@ -43,6 +44,34 @@ static void write_all(batten_context *ctx, scratch *s, const batten_mesh *mesh, 
     T_CHECK(!memcmp(back.problem.g, g, sizeof g) && back.problem.x_upper[0] == 1.75, "%s: the same bits", name);
     batten_qp_file_free(ctx, &back);
   }
+}
+
+/* A curve, and the points on it that come back as a contour. */
+static void write_curve(batten_context *ctx, scratch *s, int which) {
+  static const char *const extensions[] = {"json", "step", "igs", "svg", "csv"};
+  static const double knots[] = {0, 0, 0, 0.1, 1, 1, 1}, points[] = {0.25, 0.5, 1.5, 2.75, 3.1, -1e-7, 0.3, 0.7};
+  batten_curve *curve = NULL;
+  batten_contours back = {0};
+  char name[32];
+  T_OK(batten_curve_create(ctx, &(batten_curve_form){2, 7, knots, points, 0}, &curve), ctx);
+  for (size_t i = 0; i < 5; i++) {
+    snprintf(name, sizeof name, "curve-%d.%s", which, extensions[i]);
+    T_OK(batten_write_curves(
+             ctx, 1, (const batten_curve *const *)&curve,
+             &(batten_write_curves_options){.struct_size = sizeof(batten_write_curves_options), .name = "curve"},
+             scratch_file(s, name)),
+         ctx);
+  }
+  T_OK(batten_read_contours(ctx, s->name, &back), ctx);
+  T_CHECK(back.count == 1 && back.points[0] == 0.25 && back.points[1] == 0.5, "%s: the same bits", name);
+  batten_contours_free(ctx, &back);
+  snprintf(name, sizeof name, "curve-%d.json", which);
+  batten_curves curves = {0};
+  T_OK(batten_read_curves(ctx, scratch_file(s, name), &curves), ctx);
+  T_CHECK(curves.count == 1 && !memcmp(batten_curve_get(curves.curves[0]).control_points, points, sizeof points),
+          "%s: the same bits", name);
+  batten_curves_free(ctx, &curves);
+  batten_curve_free(curve);
 }
 
 static bool same_files(scratch *s, const char *stem, const char *extension) {
@@ -94,15 +123,18 @@ int main(void) {
   T_OK(batten_mesh_create(ctx, 3, x, 1, t, &mesh), ctx);
   T_OK(batten_carrier_ball(ctx, 3, x, x[3], &carrier), ctx);
   write_all(ctx, &s, mesh, carrier, 0);
+  write_curve(ctx, &s, 0);
   if (set_comma_locale(&s)) {
     char text[BX_NUMBER_SIZE], printed[8];
     snprintf(printed, sizeof printed, "%.1f", 0.5);
     bx_format_number(0.5, text);
     T_CHECK(!strcmp(printed, "0,5") && !strcmp(text, "0.5"), "where printf writes %s, here it is %s", printed, text);
     write_all(ctx, &s, mesh, carrier, 1);
+    write_curve(ctx, &s, 1);
     T_CHECK(same_files(&s, "mesh", "obj") && same_files(&s, "mesh", "off") && same_files(&s, "mesh", "ply") &&
                 same_files(&s, "mesh", "vtp") && same_files(&s, "carrier", "json") && same_files(&s, "qp", "qps") &&
-                same_files(&s, "qp", "json"),
+                same_files(&s, "qp", "json") && same_files(&s, "curve", "json") && same_files(&s, "curve", "step") &&
+                same_files(&s, "curve", "igs") && same_files(&s, "curve", "svg") && same_files(&s, "curve", "csv"),
             "the same bytes are written");
     test_reading(ctx, &s, x);
   } else {

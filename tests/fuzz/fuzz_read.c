@@ -128,6 +128,43 @@ static const char *read_surface(bx_reader *r) {
   return st < 0 ? "a surface that cannot be evaluated" : NULL;
 }
 
+static const char *read_curves(bx_reader *r) {
+  batten_curves curves = {0};
+  const char *wrong = NULL;
+  batten_status st = bx_read_curves_from(r, &curves);
+  if (st != BATTEN_OK) return curves.curves ? "a result in spite of a failure" : check_failure(r->ctx, st);
+  for (size_t i = 0; i < curves.count; i++) {
+    batten_curve_form form = batten_curve_get(curves.curves[i]);
+    double t = 0.5 * form.knots[0] + 0.5 * form.knots[form.knot_count - 1];
+    batten_curve_point p;
+    if (batten_curve_evaluate(r->ctx, curves.curves[i], 1, &t, &p) < 0) wrong = "a curve that cannot be evaluated";
+    if (curves.planes && !isfinite(curves.planes[i].origin[2])) wrong = "a plane that is nowhere";
+  }
+  if (curves.count == 0) wrong = "no curves";
+  batten_curves_free(r->ctx, &curves);
+  return wrong;
+}
+
+static const char *read_contours(bx_reader *r) {
+  batten_contours c = {0};
+  const char *wrong = NULL;
+  batten_status st = bx_read_contours_from(r, &c);
+  if (st != BATTEN_OK) return c.starts ? "a result in spite of a failure" : check_failure(r->ctx, st);
+  if (c.count == 0 || c.starts[0] != 0) wrong = "no contours";
+  for (size_t i = 0; i < c.count; i++) {
+    if (c.starts[i] >= c.starts[i + 1]) wrong = "a contour without points";
+    for (size_t k = 0; c.planes && k < 3; k++)
+      if (!isfinite(c.planes[i].origin[k]) || !isfinite(c.planes[i].axes[0][k]) || !isfinite(c.planes[i].axes[1][k]))
+        wrong = "a plane that is not finite";
+  }
+  for (size_t k = 0; !wrong && k < c.starts[c.count]; k++)
+    if (!isfinite(c.points[2 * k]) || !isfinite(c.points[2 * k + 1]) || (c.weights && !isfinite(c.weights[k])) ||
+        (c.parameters && !isfinite(c.parameters[k])))
+      wrong = "a point that is not finite";
+  batten_contours_free(r->ctx, &c);
+  return wrong;
+}
+
 static const char *check_matrix(const batten_matrix *m, size_t n) {
   if (!m) return NULL;
   if (m->columns != n) return "a matrix of another width";
@@ -174,17 +211,18 @@ static bool read_once(bx_reader *r, bx_format format, unsigned which, const char
     return true;
   }
   if (format == BX_JSON) {
-    if (which > 5) return false;
+    if (which > 6) return false;
     *wrong = which == 0   ? load_solid(r)
              : which == 1 ? load_carrier(r)
              : which == 2 ? read_qp(r, format)
              : which == 3 ? load_qp_solution(r)
              : which == 4 ? read_network(r)
-                          : read_surface(r);
+             : which == 5 ? read_surface(r)
+                          : read_curves(r);
     return true;
   }
-  if (which == 3 && format != BX_TEXT)
-    *wrong = read_mesh(r, format);
+  if (which == 3)
+    *wrong = format == BX_TEXT ? read_contours(r) : read_mesh(r, format);
   else if (which < 3)
     *wrong = read_points(r, format, which ? which + 1 : 0);
   else
