@@ -154,6 +154,9 @@ done:
 /* Breaks of [0, 1], and the signs of pieces. */
 static batten_status finish(batten_context *ctx, const contour_input *in, const batten_contour_options *opt,
                             contour_layout *out) {
+  if (opt->closed && out->pieces < 3) /* the reference, of degree smoothness + 1, has a free point for each */
+    return batten_fail(ctx, BATTEN_E_INVALID, "opt.%s: a closed curve of %zu span%s; it takes 3 at least",
+                       opt->breaks ? "breaks" : "spans", out->pieces, out->pieces == 1 ? "" : "s");
   out->breaks = batten_alloc_array(ctx, out->pieces + 1, sizeof *out->breaks);
   out->signs = batten_alloc_array(ctx, out->pieces, sizeof *out->signs);
   if (!out->breaks || !out->signs) return BATTEN_E_NOMEM;

@@ -26,10 +26,11 @@ static double binomial(unsigned n, unsigned k) {
   return value;
 }
 
-/* bend += tension. A span of length h has coefficients of tension / h^3; where that is far above the data's, which
- * are 1 at most, the data would drown in rounding, and the span is straight anyway: STIFF is the most it may be. */
+/* A span of length h has coefficients of 1 / h^3: in one that is far shorter than others the data would drown in
+ * rounding. STIFF is how many times as stiff as the mean span one may be. */
 static void make_bend(const bspline *b, double tension, double *bend) {
-  static const double STIFF = 1e6;
+  static const double STIFF = 1e3;
+  double spans = (double)bspline_span_count(b) / (bspline_upper(b) - bspline_lower(b));
   unsigned d = b->degree, order = d + 1;
   memset(bend, 0, b->count * order * sizeof *bend);
   if (d < 2 || !(tension > 0)) return;
@@ -40,7 +41,7 @@ static void make_bend(const bspline *b, double tension, double *bend) {
       gram[i][j] = binomial(p, i) * binomial(p, j) / (binomial(2 * p, i + j) * (2 * p + 1));
   for (size_t mu = bspline_first(b); mu < b->count; mu = bspline_next(b, mu)) {
     double lower = b->knots[mu], upper = b->knots[mu + 1];
-    double h = upper - lower, weight = h * fmin(tension, STIFF * h * h * h);
+    double h = upper - lower, weight = h * tension * fmin(1, STIFF * pow(h * spans, 3));
     bspline_rows(b, mu, 2, lower, upper, rows);
     for (unsigned i = 0; i < order; i++)
       for (unsigned j = i; j < order; j++) {
