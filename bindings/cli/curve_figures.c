@@ -137,14 +137,35 @@ void curves_report_measures(size_t count, const batten_curve_measures *m, cli_re
   report_lists(count, m, r);
 }
 
+static double in_degrees(double radians) { return radians * (180 / acos(-1)); }
+
+/* A line for each of several curves, as far as a screen goes. */
+static void print_each(size_t count, const batten_curve_measures *m) {
+  enum { SHOWN = 40 };
+  for (size_t i = 0; i < count && i < SHOWN; i++) {
+    char name[32];
+    snprintf(name, sizeof name, "curve %zu", i);
+    cli_line(name, "length %.6g, area %.6g, curvature %.4g .. %.4g, turn %.4g degrees, %zu inflection%s", m[i].length,
+             m[i].area, m[i].curvature_min, m[i].curvature_max, in_degrees(m[i].turn), m[i].inflections,
+             m[i].inflections == 1 ? "" : "s");
+  }
+  if (count > SHOWN) cli_line("...", "%zu more, see --report", count - SHOWN);
+}
+
 void curves_print_measures(size_t count, const batten_curve_measures *m) {
   totals t = add_up(count, m);
   cli_line("length", "%.9g", t.length);
   if (t.area > 0 || t.area < 0) cli_line("area", "%.9g", t.area);
   cli_line("centroid", "%.6g  %.6g", t.centroid[0], t.centroid[1]);
   cli_line("box", "%.6g .. %.6g  x  %.6g .. %.6g", t.lower[0], t.upper[0], t.lower[1], t.upper[1]);
-  cli_line("curvature", "%.4g .. %.4g", m[t.min_curve].curvature_min, m[t.max_curve].curvature_max);
-  if (count == 1) cli_line("turn", "%.6g degrees", m[0].turn * 180 / acos(-1));
+  if (count == 1)
+    cli_line("curvature", "%.4g at t = %.6g .. %.4g at t = %.6g", m[0].curvature_min, m[0].curvature_min_at,
+             m[0].curvature_max, m[0].curvature_max_at);
+  else
+    cli_line("curvature", "%.4g of curve %zu .. %.4g of curve %zu", m[t.min_curve].curvature_min, t.min_curve,
+             m[t.max_curve].curvature_max, t.max_curve);
+  if (count == 1) cli_line("turn", "%.6g degrees", in_degrees(m[0].turn));
   cli_line("energy", "%.6g", t.energy);
   cli_line("inflections", "%zu", t.inflections);
+  if (count > 1) print_each(count, m);
 }

@@ -1,5 +1,6 @@
 /* batten inspect: what is in a file, and its measures. */
 #include "cli.h"
+#include "curves.h"
 #include "network.h"
 #include "qp.h"
 #include "surface.h"
@@ -21,7 +22,8 @@ static void print_help(void) {
       "cross),\n"
       "a network of Bezier triangles (continuity across its edges, curvature), a B-spline surface (whether it is "
       "convex),\n"
-      "a solid or a carrier saved by batten, a quadratic program (its sizes, which engine would solve it).\n\n");
+      "planar B-spline curves (lengths, areas, curvature, inflections), a solid or a carrier saved by batten,\n"
+      "a quadratic program (its sizes, which engine would solve it).\n\n");
   cli_options_print(table);
   printf("\nexample:\n\n  batten inspect mesh.ply --report mesh.json\n");
 }
@@ -135,6 +137,30 @@ static batten_status tell_surface(cli_run *run, const char *path, bool print, cl
     }
   }
   batten_surface_free(surface);
+  return st;
+}
+
+static batten_status tell_curves(cli_run *run, const char *path, bool print, cli_report *r) {
+  batten_curves c = {0};
+  batten_status st = batten_read_curves(run->ctx, path, &c);
+  if (st < 0) return st;
+  const batten_curve *const *curves = (const batten_curve *const *)c.curves;
+  batten_curve_measures *m = malloc(c.count * sizeof *m);
+  if (!m) st = batten_fail(run->ctx, BATTEN_E_NOMEM, "%s: out of memory", path);
+  for (size_t i = 0; st >= 0 && i < c.count; i++) st = batten_curve_measure(run->ctx, curves[i], &m[i]);
+  if (st >= 0) {
+    cli_run_clear(run);
+    cli_report_count(r, "dimension", 2);
+    cli_report_bool(r, "planes", c.planes != NULL);
+    curves_report_form(c.count, curves, r);
+    curves_report_measures(c.count, m, r);
+    if (print) {
+      curves_print_form(c.count, curves);
+      curves_print_measures(c.count, m);
+    }
+  }
+  free(m);
+  batten_curves_free(run->ctx, &c);
   return st;
 }
 
@@ -259,6 +285,8 @@ static int work(cli_request *q) {
         st = tell_surface(&run, q->input, print, &report);
         break;
       case BATTEN_FILE_CURVES:
+        st = tell_curves(&run, q->input, print, &report);
+        break;
       case BATTEN_FILE_DOCUMENT:
         break;
       case BATTEN_FILE_UNKNOWN:
