@@ -227,7 +227,7 @@ static inline contour_rows contour_test_full(const contour_test_curve *c, const 
               value += values[entries] * reference[indices[entries]];
               entries++;
             }
-          lower[at++] = fmax(margin * value, fmin(0.5 * value, 1e-10));
+          lower[at++] = fmax(margin * value, fmin(0.9 * value, k == 1 ? 1e-6 : 1e-10));
           starts[at] = entries;
         }
       }

@@ -23,9 +23,10 @@
 #include "base/checked.h"
 #include "contour/wedges.h"
 
-/* Rounds that make a place as straight as they may each leave `margin` of what it had: after some, nothing that
- * rounding does not swallow. What has little left keeps this, or half. */
-static const double FLOOR = 1e-10;
+/* Rounds that make a place as straight, or as slow, as they may each leave `margin` of what it had: after some,
+ * nothing that rounding does not swallow. Rows of first and second differences with little left keep this, or nine
+ * tenths. What they assure of [x', x''] is at least the product of both, and has to stay above rounding. */
+static const double FLOORS[2] = {1e-6, 1e-10};
 
 /* Rows that are not written. */
 enum {
@@ -93,9 +94,9 @@ typedef struct writer {
   uint32_t *indices;
 } writer;
 
-/* sign [w, A x] >= margin of what the reference has. */
+/* sign [w, A x] >= margin of what the reference has, or `least`. */
 static void write_row(writer *out, const bspline *b, const double *coefficients, const contour_wedge *piece,
-                      const double w[2], double sign, const double *reference, double margin) {
+                      const double w[2], double sign, const double *reference, double margin, double least) {
   double size = 0, value = 0;
   for (unsigned j = 0; j <= b->degree; j++) size += coefficients[j] * coefficients[j];
   size = sqrt(size);
@@ -109,7 +110,7 @@ static void write_row(writer *out, const bspline *b, const double *coefficients,
       out->values[out->entries++] = entry;
     }
   }
-  out->lower[out->rows++] = fmax(margin * value, fmin(0.5 * value, FLOOR));
+  out->lower[out->rows++] = fmax(margin * value, fmin(0.9 * value, least));
   out->starts[out->rows] = out->entries;
 }
 
@@ -121,7 +122,7 @@ static size_t write_piece(writer *out, const contour_shape *shape, const bspline
   size_t rows = 0;
   contour_piece_set(&p, shape, b, w);
   if (!(drop & FIRST_U)) {
-    if (out) write_row(out, b, p.first, w, w->u, w->sign, reference, margin);
+    if (out) write_row(out, b, p.first, w, w->u, w->sign, reference, margin, FLOORS[0]);
     rows++;
   }
   for (unsigned i = p.zero_first ? 1 : 0; i + (p.zero_last ? 1 : 0) <= last; i++) {
@@ -129,16 +130,16 @@ static size_t write_piece(writer *out, const contour_shape *shape, const bspline
     if (i == 0) bits |= drop & (SECOND_FIRST_U | SECOND_FIRST_V);
     if (i == last) bits |= drop & (SECOND_LAST_U | SECOND_LAST_V);
     if (!(bits & (SECOND_FIRST_U | SECOND_LAST_U))) {
-      if (out) write_row(out, b, p.second + i * order, w, w->u, w->sign, reference, margin);
+      if (out) write_row(out, b, p.second + i * order, w, w->u, w->sign, reference, margin, FLOORS[1]);
       rows++;
     }
     if (!(bits & (SECOND_FIRST_V | SECOND_LAST_V))) {
-      if (out) write_row(out, b, p.second + i * order, w, w->v, w->sign, reference, margin);
+      if (out) write_row(out, b, p.second + i * order, w, w->v, w->sign, reference, margin, FLOORS[1]);
       rows++;
     }
   }
   if (!(drop & LAST_V)) {
-    if (out) write_row(out, b, p.first + (b->degree - 1) * order, w, w->v, -w->sign, reference, margin);
+    if (out) write_row(out, b, p.first + (b->degree - 1) * order, w, w->v, -w->sign, reference, margin, FLOORS[0]);
     rows++;
   }
   return rows;

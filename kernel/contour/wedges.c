@@ -11,7 +11,7 @@
  * likewise u. A first reference may be far away in direction, and first differences get most of the gaps. Later ones
  * lie where the last solution has pushed them within its own u and v: near v with their first differences, where
  * these want more room, or with their second ones. So a direction that was near one side of its gap is put near the
- * other: what was at its limit becomes free. (Mid-gap in every round reaches the same sums in about twice as many.)
+ * other: what was at its limit becomes free. (Three such rounds do what four or five with u and v in the middle do.)
  */
 #include "contour/wedges.h"
 
