@@ -4,8 +4,9 @@
  * evaluate.c   points, derivatives, curvature   length.c    arc length and its inverse, samples
  * piece.c      spans alone, integrals over them closest.c   nearest parameters
  * measure.c    area, centroid, turn, energy     extremes.c  box, curvature
- * inflections.c  changes of sign                certify*.c  the proof of shape: includes nothing of kernel/contour
- * and not the blossoms of basis/bspline.c, with which its inequalities are made
+ * bend.c       x' and [x', x''] with error bounds inflections.c  changes of sign
+ * certify*.c   the proof of shape: like bend.c includes nothing of kernel/contour and not the blossoms of
+ *              basis/bspline.c, with which its inequalities are made
  */
 #ifndef BATTEN_CURVE_INNER_H
 #define BATTEN_CURVE_INNER_H

@@ -117,7 +117,8 @@ BATTEN_API batten_status batten_curve_closest(batten_context *ctx, const batten_
 
 /* Where the curvature changes its sign, corners at knots included: *parameters [*count] ascending, freed by
  * batten_free(ctx, *parameters), NULL when there are none. A straight piece between different signs counts once, in
- * its middle; signs below the rounding of the control points do not count. Of closed curves the start may be one. */
+ * its middle; a corner that turns against the bends on both sides counts twice; signs below the rounding of the
+ * control points do not count. Of closed curves the start may be one. Fails: INVALID, NOMEM. */
 BATTEN_API batten_status batten_curve_inflections(batten_context *ctx, const batten_curve *curve, size_t *count,
                                                   double **parameters);
 
