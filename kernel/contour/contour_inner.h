@@ -171,7 +171,7 @@ batten_status contour_reference_find(batten_context *ctx, const contour_shape *s
 /* ---- inequalities (wedges.c, rows.c) ------------------------------------------------------------- */
 
 typedef struct contour_row_options {
-  double gap;         /* between wedges, radians */
+  double gap;         /* between wedges, radians; where the reference is nearly straight, half of what it can be */
   unsigned depth_max; /* bisections of a span */
   double margin;
   size_t row_limit;
@@ -187,7 +187,7 @@ typedef struct contour_wedge {
 
 typedef struct contour_rows {
   batten_matrix matrix; /* sparse, 2 n columns, rows of length 1; its arrays are batten's (free below) */
-  double *lower;        /* [matrix.rows] margin times what the reference has there: > 0 */
+  double *lower;        /* [matrix.rows] margin times what the reference has there, or a floor above rounding: > 0 */
   contour_wedge *wedges;
   size_t wedge_count;
   unsigned depth; /* bisections of the smallest */
