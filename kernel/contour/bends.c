@@ -8,8 +8,8 @@
  * beside a corner, and wiggles do not count, and a weak but long bend does.
  *
  * Runs that noise explains many times over join first, without fits: where curvature is less than its standard
- * deviation. An inflection lies in the middle of where the curvature's sign is uncertain (within two standard
- * deviations of 0): in a straight piece that is its middle. */
+ * deviation. An inflection lies where the sign is as likely the one before as the one after: in a straight piece that
+ * is its middle. */
 #include "bends.h"
 
 #include <string.h>
@@ -25,7 +25,7 @@ static const double CERTAIN = 2;
 static const double NOISE_ALONE = 1;
 /* Between two inflections, and beyond the last one, lie so many points, or nothing speaks for a run. */
 enum { POINTS_MIN = 2 };
-enum { BISECTIONS = 40 };
+enum { BISECTIONS = 40, PLACES = 64 };
 
 /* Runs that are joined: a part of a ring or chain of all that are left. */
 typedef struct group {
@@ -348,7 +348,25 @@ static void sort_changes(contour_bends *b) {
     }
 }
 
-/* Inflections in the middle of where the sign is uncertain; runs that count. */
+/* Where a change lies between two parameters (beyond 0 or 1 on closed curves) before which the curvature's sign is
+ * sign_before: p(t), that it is so still at t, is about that of the curvature there being so; the mean of t is then
+ * from + the integral of p, its square about from the integral of 2 (t - from) p. */
+static void place_change(const search *s, double from, double to, int sign_before, double *t, double *uncertainty) {
+  double step = (to - from) / PLACES, mean = 0, square = 0, steps = (double)(s->plot->count - 1);
+  for (int i = 0; i < PLACES; i++) {
+    double along = (i + 0.5) * step, at = from + along;
+    if (s->smooth->closed) at -= floor(at);
+    size_t k = at * steps < steps ? (size_t)(at * steps) : s->plot->count - 2;
+    double part = at * steps - (double)k, z = (1 - part) * value(s, k) + part * value(s, k + 1);
+    double p = 0.5 * erfc(-z * sign_before / sqrt(2));
+    mean += step * p;
+    square += 2 * step * along * p;
+  }
+  *t = from + mean;
+  *uncertainty = sqrt(fmax(square - mean * mean, 0));
+}
+
+/* Inflections where the sign changes; runs that count. */
 static void conclude(search *s, contour_bends *b) {
   const group *g = s->groups;
   size_t i = first_group(s), first = i;
@@ -359,14 +377,14 @@ static void conclude(search *s, contour_bends *b) {
     note(s, &g[i], 1);
     if (next == NONE) break;
     double from = uncertain_until(s, g[next].from, -1, &g[i]), to = uncertain_until(s, g[next].from, 1, &g[next]);
-    double t = 0.5 * (from + to);
+    double t;
+    place_change(s, from, to, g[i].sign, &t, &b->uncertainties[b->count]);
     if (s->smooth->closed) t -= floor(t);
     if (t < least) {
       least = t;
       b->sign = t > 0 ? g[i].sign : g[next].sign;
     }
-    b->inflections[b->count] = t;
-    b->uncertainties[b->count++] = 0.5 * (to - from) / CERTAIN;
+    b->inflections[b->count++] = t;
     i = next;
   } while (i != first);
   sort_changes(b);
