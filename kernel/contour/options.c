@@ -12,7 +12,7 @@ batten_contour_options batten_contour_options_default(void) {
                                   .parametrization = BATTEN_CONTOUR_CHORD,
                                   .domain = {NAN, NAN},
                                   .inflection_count = BATTEN_INFLECTIONS_AUTO,
-                                  .significance = 5,
+                                  .significance = 4,
                                   .end_points = {{NAN, NAN}, {NAN, NAN}},
                                   .end_tangents = {{NAN, NAN}, {NAN, NAN}},
                                   .rounds = 10,

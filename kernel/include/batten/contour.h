@@ -59,7 +59,7 @@ typedef struct batten_contour_options {
   const double *inflections; /* [inflection_count] ascending, inside the domain (closed: the start may be one; their
                                 number is even). Each becomes a knot */
   int sign; /* of the curvature at the start: +1 turns left, -1 right, 0 = as the data have it. Default 0. */
-  double significance; /* AUTO: standard deviations of noise that a bend must have to count, > 0. Default 5. */
+  double significance; /* AUTO: standard deviations of noise that a bend must have to count, > 0. Default 4. */
 
   int fix_ends[2];           /* non-zero: the curve begins (ends) in end_points. Open curves. Default 0. */
   double end_points[2][2];   /* NaN = the first (last) point. Default NaN. */
