@@ -38,6 +38,14 @@ static void tell_box(cli_report *r, bool print, unsigned n, const double *lower,
   putchar('\n');
 }
 
+/* In text that parts them, each in its plane; 0 where that is not so. */
+static size_t count_contours(cli_run *run, const char *path) {
+  batten_contours contours = {0};
+  size_t count = batten_read_contours(run->ctx, path, &contours) < 0 ? 0 : contours.count;
+  batten_contours_free(run->ctx, &contours);
+  return count;
+}
+
 static batten_status tell_points(cli_run *run, const char *path, bool print, cli_report *r) {
   batten_cloud cloud = {0};
   batten_status st = batten_read_points(run->ctx, path, NULL, &cloud);
@@ -47,9 +55,14 @@ static batten_status tell_points(cli_run *run, const char *path, bool print, cli
     lower[i % cloud.n] = fmin(lower[i % cloud.n], cloud.points[i]);
     upper[i % cloud.n] = fmax(upper[i % cloud.n], cloud.points[i]);
   }
+  size_t contours = count_contours(run, path);
   cli_run_clear(run);
   cli_report_count(r, "dimension", cloud.n);
   cli_report_count(r, "points", cloud.count);
+  if (contours > 1)
+    cli_report_count(r, "contours", contours);
+  else
+    cli_report_null(r, "contours");
   cli_report_bool(r, "normals", cloud.normals != NULL);
   cli_report_bool(r, "parameters", cloud.parameters != NULL);
   cli_report_bool(r, "weights", cloud.weights != NULL);
@@ -57,6 +70,7 @@ static batten_status tell_points(cli_run *run, const char *path, bool print, cli
     cli_line("points", "%zu, %s%s%s%s", cloud.count, cloud.n == 2 ? "plane" : "in space",
              cloud.normals ? ", with normals" : "", cloud.parameters ? ", with parameters" : "",
              cloud.weights ? ", with weights" : "");
+  if (print && contours > 1) cli_line("contours", "%zu, each in a plane", contours);
   tell_box(r, print && cloud.count, cloud.n, lower, upper);
   batten_cloud_free(run->ctx, &cloud);
   return st;

@@ -43,9 +43,13 @@ bx_format bx_format_of(const char *path, bool *gz) {
   return BX_UNKNOWN;
 }
 
-bool bx_is_csv(const char *path) {
+bool bx_has_extension(const char *path, const char *lower_case) {
   size_t length = strlen(path), at = extension(path, length);
-  return equals(path + at, length - at, "csv");
+  if (equals(path + at, length - at, "gz")) {
+    length = at - 1;
+    at = extension(path, length);
+  }
+  return equals(path + at, length - at, lower_case);
 }
 
 batten_status bx_check_pointers(batten_context *ctx, const char *path, const void *out, const char *out_name) {

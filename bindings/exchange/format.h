@@ -27,8 +27,9 @@ typedef enum bx_format {
 /* By the extension, in any case of letters; a last .gz is looked through when gz is not NULL, and then told. */
 bx_format bx_format_of(const char *path, bool *gz);
 
-/* Among the extensions of text, the one with commas. */
-bool bx_is_csv(const char *path);
+/* Is that the extension (in small letters, without its point), in any case of letters? A last .gz is looked through.
+ */
+bool bx_has_extension(const char *path, const char *lower_case);
 
 /* Options, path and result pointer are there? INVALID otherwise. */
 batten_status bx_check_pointers(batten_context *ctx, const char *path, const void *out, const char *out_name);

@@ -171,7 +171,7 @@ batten_status batten_write_outline(batten_context *ctx, const batten_outline *ou
       write_obj(&w, outline);
       break;
     default:
-      write_text(&w, outline, bx_is_csv(path));
+      write_text(&w, outline, bx_has_extension(path, "csv"));
   }
   return bx_commit(&w);
 }

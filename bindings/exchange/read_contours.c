@@ -5,7 +5,6 @@
 #include "contours.h"
 #include "format.h"
 #include "names.h"
-#include "number.h"
 #include "soup.h"
 #include "text_table.h"
 
@@ -56,19 +55,9 @@ static batten_status check_complete(sequences *s) {
                       s->announced, (unsigned long long)s->head_line, s->announced - s->missing);
 }
 
-/* "contour 56"? "contour x y" names columns. */
-static bool is_head(const char *line, const char **number) {
-  const char *word, *end;
-  size_t length = bx_next_word(&line, &word);
-  if (length != 7 || strncmp(word, "contour", 7)) return false;
-  *number = line;
-  length = bx_next_word(&line, &word);
-  int64_t value;
-  return length == 0 || bx_parse_integer(word, &end, &value) != BX_NUMBER_NONE;
-}
-
-static batten_status take_head(sequences *s, const char *number) {
+static batten_status take_head(sequences *s) {
   bx_reader *r = s->table.r;
+  const char *number = s->table.head;
   int64_t count = 0;
   batten_status st = check_complete(s);
   if (st == BATTEN_OK) st = bx_next_integer(r, &number, "the number of points", &count);
@@ -134,11 +123,10 @@ static batten_status take_row(sequences *s) {
 }
 
 static batten_status take_line(sequences *s) {
-  const char *number;
   bx_line line;
-  if (is_head(s->table.r->text, &number)) return take_head(s, number);
   batten_status st = bx_table_take(&s->table, &line);
   if (st != BATTEN_OK) return st;
+  if (line == BX_LINE_HEAD) return take_head(s);
   if (line == BX_LINE_BLANK) s->parted = true;
   return line == BX_LINE_ROW ? take_row(s) : BATTEN_OK;
 }
@@ -209,7 +197,8 @@ batten_status bx_read_contours_from(bx_reader *r, batten_contours *out) {
       .names = {.ctx = r->ctx},
       .table = {.r = r,
                 .wanted = 1u << BX_X | 1u << BX_Y | 1u << BX_Z | 1u << BX_W | 1u << BX_T | 1u << BX_CONTOUR,
-                .names = "x y z t w contour"}};
+                .names = "x y z t w contour",
+                .may_have_title = bx_has_extension(r->path, "dat")}};
   bool end;
   batten_status st = bx_next_line(r, &end);
   while (st == BATTEN_OK && !end) {

@@ -191,8 +191,23 @@ static batten_status take_numbers(bx_table *t, const char *line, size_t length) 
                       t->columns);
 }
 
+/* "contour 56"? "contour x y" names columns. */
+static bool is_head(const char *line, const char **number) {
+  const char *word, *end;
+  size_t length = bx_next_word(&line, &word);
+  if (!bx_word_is(word, length, "contour")) return false;
+  *number = line;
+  length = bx_next_word(&line, &word);
+  int64_t value;
+  return length == 0 || bx_parse_integer(word, &end, &value) != BX_NUMBER_NONE;
+}
+
 batten_status bx_table_take(bx_table *t, bx_line *out) {
   const char *line = t->r->text;
+  if (is_head(line, &t->head)) {
+    *out = BX_LINE_HEAD;
+    return BATTEN_OK;
+  }
   size_t length = content_length(line), at = 0;
   bx_field f;
   if (!next_field(line, length, ' ', &at, &f)) {
@@ -204,7 +219,12 @@ batten_status bx_table_take(bx_table *t, bx_line *out) {
   bool has_header = t->named && !t->names_in_comment; /* then text may stand in the other columns */
   if (t->columns == 0 && !has_header && is_header(line, length)) {
     char quote[BX_QUOTE_SIZE];
-    if (!take_names(t, line, length))
+    bool names = take_names(t, line, length), title = !names && t->may_have_title && t->r->line == 1;
+    if (title) {
+      *out = BX_LINE_COMMENT;
+      return BATTEN_OK;
+    }
+    if (!names)
       return bx_fail_line(t->r, "the header '%s' names no columns x and y; rename them, or remove the line",
                           bx_quote(line, length, quote));
     t->names_in_comment = false;

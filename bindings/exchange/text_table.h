@@ -32,15 +32,17 @@ typedef struct bx_field {
 
 typedef struct bx_table {
   bx_reader *r;
-  unsigned wanted;   /* bits 1 << role of the roles that names may give */
-  unsigned n;        /* coordinates that are asked for, 0 = open */
-  const char *names; /* what a line of names may hold, for messages: "x y z" */
+  unsigned wanted;     /* bits 1 << role of the roles that names may give */
+  unsigned n;          /* coordinates that are asked for, 0 = open */
+  const char *names;   /* what a line of names may hold, for messages: "x y z" */
+  bool may_have_title; /* the first line may be a text that names no columns, as tables of airfoils have it */
   /* what has been found */
   size_t columns;          /* 0 = no line of numbers yet */
   int column_of[BX_ROLES]; /* -1 = none */
   /* the last row */
   double values[BX_ROLES]; /* of the roles that have a column */
   bx_field contour;        /* in the line */
+  const char *head;        /* what follows the word of the last line "contour N" */
   /* inside */
   char separator;        /* of the numbers */
   bool named;            /* columns come from names */
@@ -52,6 +54,7 @@ typedef enum bx_line {
   BX_LINE_BLANK,   /* nothing on it */
   BX_LINE_COMMENT, /* or names in one */
   BX_LINE_NAMES,
+  BX_LINE_HEAD, /* "contour N" */
   BX_LINE_ROW
 } bx_line;
 

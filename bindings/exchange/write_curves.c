@@ -167,7 +167,7 @@ static bool is_known(bx_format format, const char *path) {
   static const bx_format known[] = {BX_JSON, BX_STEP, BX_IGES, BX_SVG, BX_VTU, BX_VTP, BX_VTK};
   for (size_t i = 0; i < sizeof known / sizeof known[0]; i++)
     if (format == known[i]) return true;
-  return bx_is_csv(path);
+  return format == BX_TEXT && bx_has_extension(path, "csv");
 }
 
 batten_status batten_write_curves(batten_context *ctx, size_t count, const batten_curve *const *curves,

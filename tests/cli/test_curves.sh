@@ -74,5 +74,15 @@ run 1 "broken.json: curve.control_points[2]: 1 numbers, where 2 are expected" in
 sed 's/1, 1, 1\], "control/1, 1, 2], "control/' parabola.json >broken.json
 run 1 "broken.json: curve: knots" inspect broken.json
 
+# Contours are points that are parted.
+printf 'contour 2\n1 2 3\n4 5 3\ncontour 1\n7 8 9\n' >stack.txt
+run 0 "" inspect stack.txt --report r.json
+is r.json points 3
+is r.json contours 2
+check "their number is printed" grep -q '^contours .*2, each in a plane' out
+printf '1 2 3\n4 5 7\n' >cloud.xyz
+run 0 "" inspect cloud.xyz --report r.json
+is r.json contours None
+
 echo "1..$count"
 exit $bad

@@ -68,6 +68,24 @@ static void test_parting(batten_context *ctx) {
   T_CHECK(!c.starts && !c.points && !c.count, "empty after it is freed");
 }
 
+/* Tables of airfoils: a title on the first line of .dat, and nowhere else. */
+static void test_title(batten_context *ctx) {
+  static const char text[] = "NACA 0012, 1933\n1 0.00126\n0 0\n1 -0.00126\n";
+  static const char late[] = "\nNACA 0012\n1 0\n";
+  batten_contours c = {0};
+  T_OK(read_bytes(ctx, "a.DAT", text, strlen(text), &c), ctx);
+  T_CHECK(c.count == 1 && c.starts[1] == 3 && c.points[1] == 0.00126, "a title above an airfoil");
+  batten_contours_free(ctx, &c);
+  T_STATUS(read_bytes(ctx, "a.txt", text, strlen(text), &c), BATTEN_E_FORMAT, ctx,
+           "a.txt:1: the header 'NACA 0012, 1933' names no columns x and y");
+  T_STATUS(read_bytes(ctx, "a.dat", late, strlen(late), &c), BATTEN_E_FORMAT, ctx,
+           "a.dat:2: the header 'NACA 0012' names no columns x and y");
+  batten_cloud cloud = {0};
+  T_OK(points_of(ctx, "a.txt", "contour 2\n1 2 3\n4 5 6\ncontour 1\n7 8 9\n", 38, 0, &cloud), ctx);
+  T_CHECK(cloud.count == 3 && cloud.points[6] == 7, "as points, without the lines that part them");
+  batten_cloud_free(ctx, &cloud);
+}
+
 /* As many contours as rows, from both ends. */
 static void test_many(batten_context *ctx) {
   enum { CONTOURS = 3000 };
@@ -290,6 +308,7 @@ int main(void) {
   scratch s;
   scratch_open(&s);
   test_parting(ctx);
+  test_title(ctx);
   test_many(ctx);
   test_constant(ctx);
   test_oblique(ctx);
