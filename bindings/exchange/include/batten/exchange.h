@@ -35,7 +35,7 @@ BATTEN_API batten_read_points_options batten_read_points_options_default(void);
  *   .xyz .txt .csv .tsv .asc .dat   text: separated by semicolons, else commas, else blanks; # % // comments. Without
  *             names 2 columns are x y, 3 x y z, 4 x y nx ny, 6 x y z nx ny nz; others need a line of names above the
  *             numbers (also as a comment), from which x, y, z, nx, ny, nz, the parameters u, v and the weight w (or
- *             "weight") are taken in any order.
+ *             "weight") are taken in any order. Lines "contour N" are passed over.
  *   .ply      ASCII and both binary orders; nx ny nz are the normals, u v the parameters, w or weight the weights; the
  *             vertices are planar without z
  *   .obj      v and vn: normals where every vertex has one      .off  also NOFF, COFF, STOFF
@@ -223,7 +223,7 @@ typedef struct batten_contours {
   batten_plane *planes; /* [count] or NULL: the file is planar */
 } batten_contours;
 
-/* Text (.txt .xyz .csv .tsv .asc .dat, also .gz), one contour or several:
+/* Text (.txt .xyz .csv .tsv .asc, .dat where the first line may be a title, also .gz), one contour or several:
  *   blocks of lines "x y" or "x y z" parted by blank lines; or each after a line "contour N" (N points follow); or
  *   with a line of names above the numbers, of which x y z, t or "parameter", w or "weight" and contour or "curve"
  *   (its number or name; rows of one contour need not be neighbours) are taken.
