@@ -163,7 +163,8 @@ typedef struct contour_reference {
 
 /* A curve of the wanted shape in the space of the fit, that satisfies the ends, is near the data, and that
  * contour_rows_make accepts. construction 1, 2, or 0: both are made, and the one with the lower sum of squares is
- * kept. Fails: INFEASIBLE (the ends contradict the shape; says how), NOMEM, CANCELLED. Without fixed ends construction 1 does not fail. */
+ * kept. Fails: INFEASIBLE (the ends contradict the shape; says how), NOMEM, CANCELLED. Without fixed ends construction
+ * 1 does not fail. */
 batten_status contour_reference_find(batten_context *ctx, const contour_shape *shape, const contour_space *space,
                                      const contour_ends *ends, const contour_data *data, const double *parameters,
                                      unsigned construction, double tension, contour_reference *out);

@@ -232,7 +232,7 @@ static void test_parabola(batten_context *ctx) {
 /* Every kind, degree and smoothness by both constructions. */
 static void test_random(batten_context *ctx) {
   enum { CASES = 300 };
-  size_t second = 0, first = 0, wrong = 0, failed = 0, better = 0, both = 0;
+  size_t second = 0, first = 0, wrong = 0, failed = 0, better = 0, both = 0, nearer = 0;
   double jump = 0, ratio = 0;
   for (uint64_t seed = 0; seed < CASES; seed++) {
     contour_rule r = contour_rule_random(seed + 5000);
@@ -257,7 +257,9 @@ static void test_random(batten_context *ctx) {
       wrong += at < t.shape.spans;
       if (t.shape.closed) jump = fmax(jump, seam(&t));
     }
-    if (rms[1] > 0 && rms[2] > 0) {
+    t.construction = 0;
+    if (rms[1] > 0 && rms[2] > 0 && trial_run(ctx, &t) >= 0) {
+      nearer += t.rms == fmin(rms[1], rms[2]);
       both++;
       better += rms[2] < rms[1];
       ratio += log(rms[2] / rms[1]);
@@ -267,9 +269,24 @@ static void test_random(batten_context *ctx) {
   T_CHECK(failed == 0 && first == CASES, "construction 1 serves in all of %d cases", CASES);
   T_CHECK(second >= CASES * 9 / 10, "construction 2 serves in %zu of %d", second, CASES);
   T_CHECK(wrong == 0, "all have the wanted signs");
+  T_CHECK(both > 0 && nearer == both, "of both the nearer one is taken");
   T_RATIO(jump, 1e-9, "closed ones are smooth where they close");
   printf("# construction 2 is nearer to the data in %zu of %zu, its distance is %.3f of the other's\n", better, both,
          exp(ratio / (double)both));
+}
+
+/* One to three turns on few spans: legs of higher degree follow where those of degree smoothness + 1 cannot. */
+static void test_spirals(batten_context *ctx) {
+  for (uint64_t seed = 0; seed < 4; seed++)
+    for (unsigned smoothness = 1; smoothness <= 2; smoothness++) {
+      contour_rule r = {.kind = CONTOUR_SPIRAL, .count = 100, .seed = seed};
+      trial t = trial_make(&r, 5, smoothness, 6, 0);
+      t.construction = 1;
+      T_OK(trial_run(ctx, &t), ctx);
+      T_CHECK(right_signs(&t), "a spiral of few spans bends to its side");
+      T_RATIO(t.rms, 0.01, "and follows its data: smoothness %u, seed %d", smoothness, (int)seed);
+      trial_free(ctx, &t);
+    }
 }
 
 static void test_ends(batten_context *ctx) {
@@ -461,6 +478,7 @@ int main(void) {
   batten_context *ctx = t_context(NULL, NULL, 1);
   test_parabola(ctx);
   test_random(ctx);
+  test_spirals(ctx);
   test_ends(ctx);
   test_neighbours(ctx);
   test_bad_data(ctx);
