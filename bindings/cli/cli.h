@@ -19,6 +19,7 @@ int cli_solid(int argc, char **argv);
 int cli_qp(int argc, char **argv);
 int cli_network(int argc, char **argv);
 int cli_convex(int argc, char **argv);
+int cli_curve(int argc, char **argv);
 int cli_inspect(int argc, char **argv);
 
 /* ---- options.c: one table gives the parser and the help ---- */
@@ -99,6 +100,10 @@ typedef enum cli_output_kind {
   CLI_OUTPUT_NETWORK,
   CLI_OUTPUT_PATCH,         /* tensor-product surface */
   CLI_OUTPUT_UNCONSTRAINED, /* the same, to compare with */
+  CLI_OUTPUT_CURVE,
+  CLI_OUTPUT_CURVE_FREE, /* the same, to compare with */
+  CLI_OUTPUT_PROPOSAL,   /* inflections as the data propose them */
+  CLI_OUTPUT_PLOTS,      /* pictures in the plane */
   CLI_OUTPUT_QP,
   CLI_OUTPUT_QP_SOLUTION
 } cli_output_kind;

@@ -17,6 +17,9 @@ static const char *const network_formats[] = {".step", ".stp", ".iges", ".igs", 
                                               ".obj",  ".stl", ".off",  ".vtp", ".vtk",  NULL};
 static const char *const picture_formats[] = {".png", NULL};
 static const char *const plane_picture_formats[] = {".svg", ".png", NULL};
+static const char *const curve_formats[] = {".json", ".step", ".stp", ".iges", ".igs", ".svg",
+                                            ".vtu",  ".vtp",  ".vtk", ".csv",  NULL};
+static const char *const proposal_formats[] = {".json", NULL};
 static const char *const qp_formats[] = {".qps", ".sif", ".mps", ".json", NULL};
 static const char *const qp_solution_formats[] = {".json", ".csv", NULL};
 
@@ -148,6 +151,10 @@ static const rule *rule_of(cli_output_kind kind) {
       {CLI_OUTPUT_PATCH, network_formats, "-o", ".step .iges .json .vtu, or of a mesh .ply .obj .stl .off .vtp .vtk"},
       {CLI_OUTPUT_UNCONSTRAINED, network_formats, "--unconstrained",
        ".step .iges .json .vtu, or of a mesh .ply .obj .stl .off .vtp .vtk"},
+      {CLI_OUTPUT_CURVE, curve_formats, "-o", ".json .step .iges .svg .vtu .vtp .vtk .csv"},
+      {CLI_OUTPUT_CURVE_FREE, curve_formats, "--unconstrained", ".json .step .iges .svg .vtu .vtp .vtk .csv"},
+      {CLI_OUTPUT_PROPOSAL, proposal_formats, "--proposal", ".json"},
+      {CLI_OUTPUT_PLOTS, plane_picture_formats, "--picture", ".png or .svg"},
       {CLI_OUTPUT_QP, qp_formats, "--write", ".qps or .json"},
       {CLI_OUTPUT_QP_SOLUTION, qp_solution_formats, "-o", ".json or .csv"},
   };

@@ -151,7 +151,7 @@ run 0 "" convex points.xyz --quiet --function --concave --picture f.png --size 3
 # ---- report -------------------------------------------------------------------------------------
 
 for key in $(sed -n -e '/^## Common/,/^## batten solid/s/^| \(`[^|]*`\) |.*/\1/p' \
-  -e '/^## batten convex/,/^## batten network/s/^| \(`[^|]*`\) |.*/\1/p' "$root/docs/report.md" | tr -d '`'); do
+  -e '/^## batten convex/,/^## batten curve/s/^| \(`[^|]*`\) |.*/\1/p' "$root/docs/report.md" | tr -d '`'); do
   echo "$key"
 done | sort >documented
 for file in $report w.json; do

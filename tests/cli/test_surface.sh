@@ -45,7 +45,7 @@ check "a saddle is told to be none" grep -q '^convexity .*not proven' out
 # Every key that is reported is described, here or in the table of `batten convex`, to which this points.
 {
   sed -n '/^## batten inspect/,/^## batten convex/p' "$root/docs/report.md" | sed -n '/^- surface/,/^- solid/p'
-  sed -n '/^## batten convex/,/^## batten network/p' "$root/docs/report.md" | sed -n '/`certified`/,/`box_x_min`/p'
+  sed -n '/^## batten convex/,/^## batten curve/p' "$root/docs/report.md" | sed -n '/`certified`/,/`box_x_min`/p'
 } >described
 undescribed=
 for key in $(python3 -c 'import json; print("\n".join(json.load(open("r.json"))))' | sed -n '/^kind$/,$p'); do
