@@ -229,7 +229,7 @@ static void draw_layer(picture_sheet *s, const plot_view *v, const batten_plot_l
       break;
     default:
       sheet_marks(s, &v->frame, l->count, l->points, l->kind == BATTEN_PLOT_CROSSES ? SHEET_CROSS : SHEET_RING,
-                  mark_radius(l, v, side), 1.4e-3 * side, l->color);
+                  mark_radius(l, v, side), fmax(1.2, 1.4e-3 * side), l->color);
   }
 }
 
@@ -247,6 +247,7 @@ static void draw_legend(picture_sheet *s, const plot_view *v, double side) {
     } else {
       batten_plot_layer one = *l;
       double place[2] = {0, 0};
+      one.width = 1e3 * mark_radius(l, v, side) / side; /* as in the plot */
       picture_frame f = {x[0], middle - unit, x[1], middle + unit, {0, 0}, {0.5 * (x[0] + x[1]), middle}, {1, 1}};
       plot_view sample = {.unit = unit, .frame = f};
       one.count = 1;
