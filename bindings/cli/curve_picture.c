@@ -212,8 +212,9 @@ static batten_status find_scale(batten_context *ctx, drawing *d) {
   if (st >= 0) {
     qsort(sizes, count, sizeof *sizes, ascending);
     double high = sizes[count - 1 - count / 20];
-    d->scale = high > 0 ? 0.12 * d->size / high : 0;
-    d->most = 0.3 * d->size;
+    double length = (d->w->count == 1 ? 0.12 : 0.05) * d->size;
+    d->scale = high > 0 ? length / high : 0;
+    d->most = 2.5 * length;
   }
   batten_free(ctx, sizes);
   return st;
@@ -283,12 +284,12 @@ static void shape_plot(const drawing *d, int which, batten_plot_layer *layers, b
   bool few = w->count == 1 && s->polygon.count <= 60;
   layers[0] = layer(BATTEN_PLOT_LINE, &s->quills, 0xcfdbe9, 0.9, NULL);
   layers[1] = layer(BATTEN_PLOT_LINE, &s->envelope, 0x8fabcb, 1.3, which ? "curvature" : NULL);
-  layers[2] = layer(BATTEN_PLOT_LINE, &s->polygon, 0xb8b8b8, 1.2, which ? "control polygon" : NULL);
-  layers[3] = layer(BATTEN_PLOT_DOTS, &s->polygon, 0x9a9a9a, few ? 3.2 : 1.8, NULL);
+  layers[2] = layer(BATTEN_PLOT_LINE, &s->polygon, 0xa0a0a0, 1.2, which ? "control polygon" : NULL);
+  layers[3] = layer(BATTEN_PLOT_DOTS, &s->polygon, 0x808080, few ? 3.2 : 1.8, NULL);
   layers[4] = layer(BATTEN_PLOT_LINE, &s->curve, 0x1f4e79, 2.4, which ? "curve" : NULL);
   layers[5] = layer(BATTEN_PLOT_CROSSES, &d->data, 0xc8442c, d->data.count <= 200 ? 4 : 0, which ? "data" : NULL);
-  layers[6] =
-      layer(BATTEN_PLOT_RINGS, &s->inflections, 0x1a7f37, 7, which && s->inflections.count ? "inflection" : NULL);
+  layers[6] = layer(BATTEN_PLOT_RINGS, &s->inflections, 0x1a7f37, w->count == 1 ? 7 : 4,
+                    which && s->inflections.count ? "inflection" : NULL);
   double sum = 0;
   size_t inflections = 0;
   bool proven = true;

@@ -4,12 +4,13 @@
 #include <stdlib.h>
 
 #include "curve.h"
+#include "curves.h"
 
 /* All contours together. */
 typedef struct totals {
-  size_t points, spans, unknowns, rows, equalities, iterations, wanted, found, found_free;
+  size_t points, unknowns, rows, equalities, iterations, wanted, found, found_free;
   unsigned rounds, fallbacks;
-  double unconstrained, first, reference, lsq, max_error, margin, length, misfit, inflection_error;
+  double unconstrained, first, reference, lsq, max_error, margin, misfit, inflection_error;
   size_t worst; /* contour of max_error */
   bool certified;
   double time_parameters, time_inflections, time_knots, time_reference, time_rows, time_qp, time_correction,
@@ -24,7 +25,6 @@ static totals add_up(const curve_work *w) {
     const curve_item *c = &w->items[k];
     const batten_contour_info *i = &c->info;
     t.points += c->count;
-    t.spans += i->spans;
     t.unknowns += i->unknowns;
     t.rows += last_rows(i);
     t.equalities += i->equalities;
@@ -45,7 +45,6 @@ static totals add_up(const curve_work *w) {
     t.margin = fmin(t.margin, i->shape.margin_min);
     t.inflection_error = fmax(t.inflection_error, i->shape.inflection_error);
     t.misfit = fmax(t.misfit, i->misfit);
-    t.length += c->measures.length;
     t.certified = t.certified && i->shape.certified;
     t.time_parameters += i->time_parameters_s;
     t.time_inflections += i->time_inflections_s;
@@ -125,7 +124,26 @@ static void report_fit(const curve_work *w, const totals *t, cli_report *r) {
   cli_report_bool(r, "certified", t->certified);
   cli_report_number(r, "margin_min", t->margin);
   cli_report_number(r, "inflection_error", t->inflection_error);
-  cli_report_number(r, "length", t->length);
+}
+
+/* Curves and their measures as arrays; false when out of memory. */
+typedef struct curve_arrays {
+  const batten_curve **curves;
+  batten_curve_measures *measures;
+} curve_arrays;
+
+static bool arrays_make(const curve_work *w, curve_arrays *out) {
+  *out = (curve_arrays){malloc(w->count * sizeof *out->curves), malloc(w->count * sizeof *out->measures)};
+  for (size_t i = 0; out->curves && out->measures && i < w->count; i++) {
+    out->curves[i] = w->items[i].curve;
+    out->measures[i] = w->items[i].measures;
+  }
+  return out->curves && out->measures;
+}
+
+static void arrays_free(curve_arrays *a) {
+  free(a->curves);
+  free(a->measures);
 }
 
 void curve_report(const curve_work *w, cli_report *r) {
@@ -134,14 +152,18 @@ void curve_report(const curve_work *w, cli_report *r) {
   cli_report_text(r, "command", "curve");
   cli_report_common(r, &w->run, w->status);
   cli_report_text(r, "input", q->common.input);
-  cli_report_count(r, "contours", w->count);
   cli_report_count(r, "points", t.points);
-  cli_report_count(r, "degree", q->options.degree);
   cli_report_count(r, "smoothness", q->options.smoothness);
-  cli_report_bool(r, "closed", q->options.closed);
-  cli_report_count(r, "spans", t.spans);
   report_fit(w, &t, r);
   report_lists(w, r);
+  curve_arrays a;
+  if (arrays_make(w, &a)) {
+    curves_report_form(w->count, a.curves, r);
+    curves_report_measures(w->count, a.measures, r);
+  } else {
+    r->failed = true;
+  }
+  arrays_free(&a);
   cli_report_number(r, "time_read_s", w->time_read_s);
   cli_report_number(r, "time_propose_s", w->time_propose_s);
   cli_report_number(r, "time_parameters_s", t.time_parameters);
@@ -161,12 +183,18 @@ void curve_report(const curve_work *w, cli_report *r) {
 void curve_summary(const curve_work *w) {
   const curve_request *q = w->request;
   totals t = add_up(w);
-  cli_line("points", "%zu%s", t.points, w->count == 1 ? "" : " of");
-  if (w->count != 1) cli_line("contours", "%zu", w->count);
-  cli_line("curve", "degree %u, %u continuous derivatives, %zu polynomial pieces%s", q->options.degree,
-           q->options.smoothness, t.spans, q->options.closed ? ", closed" : "");
+  curve_arrays a;
+  if (!arrays_make(w, &a)) {
+    arrays_free(&a);
+    return;
+  }
+  cli_line("points", "%zu", t.points);
+  curves_print_form(w->count, a.curves);
   cli_line("sums", "unconstrained %.6g, reference %.6g, result %.6g", t.unconstrained, t.reference, t.lsq);
-  cli_line("rounds", "%u, with %zu inequalities in the last", t.rounds, t.rows);
+  if (t.rows)
+    cli_line("rounds", "%u, with %zu inequalities in the last", t.rounds, t.rows);
+  else
+    cli_line("rounds", "%u, which needed no inequalities in the end", t.rounds);
   if (w->count == 1)
     cli_line("deviation", "rms %.4g, largest %.4g at point %zu", w->items[0].info.rms, t.max_error,
              w->items[0].info.max_error_index);
@@ -178,7 +206,8 @@ void curve_summary(const curve_work *w) {
              t.wanted, t.wanted == 1 ? "" : "s", t.found_free, t.margin);
   else
     cli_line("shape", "NOT proven: %zu inflections wanted, %zu found", t.wanted, t.found);
-  cli_line("length", "%.6g", t.length);
+  curves_print_measures(w->count, a.measures);
+  arrays_free(&a);
   double fitting = t.time_parameters + t.time_inflections + t.time_knots + t.time_reference + t.time_rows +
                    t.time_qp + t.time_correction;
   cli_line("time", "%.2f s: fit %.2f, proof %.2f, files %.2f", batten_now() - w->run.started, fitting, t.time_check,

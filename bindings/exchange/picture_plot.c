@@ -112,10 +112,17 @@ static bool has_legend(const batten_plot *p) {
   return false;
 }
 
-static void make_frame(plot_view *v) {
+/* Above the frame, in heights of lettering: caption, then the legend on the right and the name of the upward
+ * axis on the left. */
+static double top_room(const batten_plot *p) {
+  return 1.2 + (p->caption ? 1.8 : 0) + (has_legend(p) || p->labels[1] ? 1.5 : 0);
+}
+
+/* top: of the plot in its row that needs most, so that frames are in line. */
+static void make_frame(plot_view *v, double top) {
   const batten_plot *p = v->plot;
   picture_frame *f = &v->frame;
-  double top = (p->caption || has_legend(p) ? 3.4 : 1.2) + (p->labels[1] ? 1.5 : 0), size[2];
+  double size[2];
   *f = (picture_frame){.x0 = v->x0 + 5.2 * v->unit,
                        .y0 = v->y0 + top * v->unit,
                        .x1 = v->x1 - 2.2 * v->unit,
@@ -162,7 +169,11 @@ static batten_status lay_out(batten_context *ctx, unsigned rows, unsigned column
     if (st < 0) return st;
   }
   join_groups(count, views);
-  for (size_t i = 0; i < count; i++) make_frame(&views[i]);
+  for (size_t i = 0; i < count; i++) {
+    double above = 0;
+    for (size_t k = i - i % columns; k < i - i % columns + columns; k++) above = fmax(above, top_room(&plots[k]));
+    make_frame(&views[i], above);
+  }
   return BATTEN_OK;
 }
 
@@ -233,9 +244,9 @@ static void draw_layer(picture_sheet *s, const plot_view *v, const batten_plot_l
   }
 }
 
-/* Samples of the layers with a name, from the right end of the frame. */
+/* Samples of the layers with a name, from the right end of the frame, right above it. */
 static void draw_legend(picture_sheet *s, const plot_view *v, double side) {
-  double right = v->frame.x1, unit = v->unit, height = 0.85 * unit, base = v->y0 + 1.9 * unit;
+  double right = v->frame.x1, unit = v->unit, height = 0.85 * unit, base = v->frame.y0 - 0.7 * unit;
   for (size_t i = v->plot->layer_count; i-- > 0;) {
     const batten_plot_layer *l = &v->plot->layers[i];
     if (!l->label) continue;
@@ -263,7 +274,7 @@ static void draw_view(picture_sheet *s, const plot_view *v, double side, double 
   draw_axes(s, v);
   for (size_t i = 0; i < v->plot->layer_count; i++)
     if (v->plot->layers[i].count) draw_layer(s, v, &v->plot->layers[i], side, xy);
-  if (v->plot->caption) sheet_text(s, v->frame.x0, v->y0 + 1.9 * v->unit, 0.95 * v->unit, 0, TITLE, v->plot->caption);
+  if (v->plot->caption) sheet_text(s, v->frame.x0, v->y0 + 1.7 * v->unit, 0.95 * v->unit, 0, TITLE, v->plot->caption);
   draw_legend(s, v, side);
 }
 
