@@ -5,6 +5,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+static const double DEGREES = 57.29577951308232; /* of a radian */
+
 /* ---- form -------------------------------------------------------------------------------------------- */
 
 typedef struct sizes {
@@ -92,7 +94,7 @@ static double length_of(const batten_curve_measures *m) { return m->length; }
 static double area_of(const batten_curve_measures *m) { return m->area; }
 static double minimum_of(const batten_curve_measures *m) { return m->curvature_min; }
 static double maximum_of(const batten_curve_measures *m) { return m->curvature_max; }
-static double turn_of(const batten_curve_measures *m) { return m->turn; }
+static double turn_of(const batten_curve_measures *m) { return m->turn * DEGREES; }
 static double energy_of(const batten_curve_measures *m) { return m->energy; }
 
 /* A figure of each curve. */
@@ -131,7 +133,7 @@ void curves_report_measures(size_t count, const batten_curve_measures *m, cli_re
   cli_report_number(r, "curvature_max_at", m[t.max_curve].curvature_max_at);
   cli_report_count(r, "curvature_min_curve", t.min_curve);
   cli_report_count(r, "curvature_max_curve", t.max_curve);
-  cli_report_number(r, "turn", count == 1 ? m[0].turn : NAN);
+  cli_report_number(r, "turn", count == 1 ? m[0].turn * DEGREES : NAN);
   cli_report_number(r, "energy", t.energy);
   cli_report_count(r, "inflections", t.inflections);
   report_lists(count, m, r);

@@ -156,6 +156,7 @@ void curve_report(const curve_work *w, cli_report *r) {
   cli_report_count(r, "smoothness", q->options.smoothness);
   report_fit(w, &t, r);
   report_lists(w, r);
+  cli_report_bool(r, "planes", w->planes != NULL);
   curve_arrays a;
   if (arrays_make(w, &a)) {
     curves_report_form(w->count, a.curves, r);

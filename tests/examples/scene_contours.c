@@ -79,13 +79,15 @@ static bool print_scene(char **argv) {
 int main(int argc, char **argv) {
   const char *name = argc == 2 ? argv[1] : "";
   if (argc == 5 && strtoul(argv[2], NULL, 10) >= 3 && print_scene(argv)) return 0;
-  bool fore = strncmp(name, "fore", 4) == 0, aft = strncmp(name, "aft", 3) == 0;
+  bool wanted = strstr(name, "-inflections") != NULL;
+  bool fore = !strcmp(name, "fore") || !strcmp(name, "fore-inflections");
+  bool aft = !strcmp(name, "aft") || !strcmp(name, "aft-inflections");
   if (!fore && !aft) {
     fprintf(stderr,
             "usage: scene_contours fore | aft | fore-inflections | aft-inflections\n"
             "       scene_contours wave | loop | frame | airfoil COUNT NOISE SEED\n");
     return 2;
   }
-  print_sections(aft, strchr(name, '-') != NULL);
+  print_sections(aft, wanted);
   return 0;
 }
