@@ -200,7 +200,6 @@ static size_t join(search *s, size_t i) {
     keep->energy += other->energy;
     if (fabs(value(s, other->peak)) > fabs(value(s, keep->peak))) keep->peak = other->peak;
     if (keep->after != NONE) g[keep->after].before = to;
-    /* A ring of four becomes one of two. */
   }
   return to;
 }
