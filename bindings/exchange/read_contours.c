@@ -10,6 +10,7 @@
 
 #include "base/checked.h"
 
+#include <math.h>
 #include <string.h>
 
 typedef struct sequences {
@@ -131,6 +132,45 @@ static batten_status take_line(sequences *s) {
   return line == BX_LINE_ROW ? take_row(s) : BATTEN_OK;
 }
 
+/* ---- airfoils ---------------------------------------------------------------------------------------- */
+
+static bool is_count(double x) { return x >= 2 && x < 1e9 && x == floor(x); }
+
+static void turn_round(double *points, size_t count) {
+  for (size_t i = 0; i < count / 2; i++)
+    for (int k = 0; k < 2; k++) {
+      double *a = &points[2 * i + (size_t)k], *b = &points[2 * (count - 1 - i) + (size_t)k], x = *a;
+      *a = *b;
+      *b = x;
+    }
+}
+
+/* Lednicer's tables of airfoils: under the title the numbers of points of the upper and of the lower surface, then
+ * these, both from the nose to the tail. They become one contour as in Selig's tables: along the upper surface to the
+ * nose, back along the lower one. The counts have to fit, since a first point may also have whole coordinates. */
+static batten_status join_surfaces(sequences *s) {
+  if (!s->table.may_have_title || s->width != 2 || s->has_heads || s->which || s->table.named) return BATTEN_OK;
+  double *rows = s->rows;
+  if (!is_count(rows[0]) || !is_count(rows[1])) return BATTEN_OK;
+  size_t upper = (size_t)rows[0], lower = (size_t)rows[1];
+  if (upper + lower + 1 != s->count) {
+    bool stands_alone = s->contours > 1 && s->starts[1] == 1;
+    if (!stands_alone) return BATTEN_OK;
+    return batten_fail(s->ctx, BATTEN_E_FORMAT,
+                       "%s: the first line of numbers says that %zu and %zu points of two surfaces follow, but there "
+                       "are %zu; correct or remove it",
+                       bx_short_path(s->table.r->path), upper, lower, s->count - 1);
+  }
+  turn_round(rows + 2, upper);
+  double *nose = rows + 2 * upper;
+  bool twice = nose[0] == nose[2] && nose[1] == nose[3];
+  memmove(rows, rows + 2, 2 * upper * sizeof *rows);
+  memmove(rows + 2 * upper, rows + 2 * (upper + 1 + twice), 2 * (lower - twice) * sizeof *rows);
+  s->count = upper + lower - twice;
+  s->contours = 1;
+  return BATTEN_OK;
+}
+
 /* ---- from rows to contours --------------------------------------------------------------------------- */
 
 /* Rows of one contour next to each other, in their order: order [count] are the rows, starts [contours + 1]. */
@@ -208,6 +248,7 @@ batten_status bx_read_contours_from(bx_reader *r, batten_contours *out) {
   if (st == BATTEN_OK) st = check_complete(&s);
   if (st == BATTEN_OK && s.count == 0)
     st = batten_fail(r->ctx, BATTEN_E_FORMAT, "%s: no points in the file", bx_short_path(r->path));
+  if (st == BATTEN_OK) st = join_surfaces(&s);
   if (st == BATTEN_OK) st = finish(&s, out);
   free_sequences(&s);
   return st;

@@ -86,6 +86,37 @@ static void test_title(batten_context *ctx) {
   batten_cloud_free(ctx, &cloud);
 }
 
+static void check_airfoil(batten_context *ctx, const char *text, size_t count, const double *wanted,
+                          const char *what) {
+  batten_contours c = {0};
+  T_OK(read_bytes(ctx, "l.dat", text, strlen(text), &c), ctx);
+  T_CHECK(c.count == 1 && c.starts[1] == count && !memcmp(c.points, wanted, 2 * count * sizeof *wanted),
+          "%s: %zu contours, %zu points", what, c.count, c.starts[c.count]);
+  batten_contours_free(ctx, &c);
+}
+
+/* Lednicer's tables of airfoils: counts, upper surface, lower surface, both from the nose. */
+static void test_surfaces(batten_context *ctx) {
+  static const double sharp[] = {1, .1, .5, .3, 0, 0, .5, -.2, 1, -.1};
+  static const double blunt[] = {1, .1, .5, .3, 0, .01, 0, -.01, .5, -.2, 1, -.1};
+  static const double plain[] = {3, 2, 0, 0, .5, .3, 1, .1};
+  static const char upside[] = "NACA\n3. 3.\n\n0 0\n.5 .3\n1 .1\n0 0\n.5 -.2\n1 -.1\n\n0 0\n";
+  check_airfoil(ctx, "NACA 1\n  3.  3.\n\n0 0\n.5 .3\n1 .1\n\n0 0\n.5 -.2\n1 -.1\n", 5, sharp,
+                "two surfaces, the nose in both");
+  check_airfoil(ctx, "NACA 1\r\n3 3\r\n0 0\r\n.5 .3\r\n1 .1\r\n0 0\r\n.5 -.2\r\n1 -.1", 5, sharp,
+                "without blank lines");
+  check_airfoil(ctx, "NACA 1\n3 3\n\n0 .01\n.5 .3\n1 .1\n\n0 -.01\n.5 -.2\n1 -.1\n", 6, blunt,
+                "a nose of two points");
+  check_airfoil(ctx, "NACA 1\n3 2\n0 0\n.5 .3\n1 .1\n", 4, plain, "whole coordinates of a first point");
+  batten_contours c = {0};
+  T_STATUS(read_bytes(ctx, "l.dat", upside, strlen(upside), &c), BATTEN_E_FORMAT, ctx,
+           "l.dat: the first line of numbers says that 3 and 3 points of two surfaces follow, but there are 7; "
+           "correct or remove it");
+  T_OK(read_bytes(ctx, "l.txt", upside + 5, strlen(upside) - 5, &c), ctx);
+  T_CHECK(c.count == 3 && c.starts[1] == 1 && c.points[0] == 3, "only in .dat: %zu contours", c.count);
+  batten_contours_free(ctx, &c);
+}
+
 /* As many contours as rows, from both ends. */
 static void test_many(batten_context *ctx) {
   enum { CONTOURS = 3000 };
@@ -309,6 +340,7 @@ int main(void) {
   scratch_open(&s);
   test_parting(ctx);
   test_title(ctx);
+  test_surfaces(ctx);
   test_many(ctx);
   test_constant(ctx);
   test_oblique(ctx);

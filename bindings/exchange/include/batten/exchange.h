@@ -226,7 +226,9 @@ typedef struct batten_contours {
 /* Text (.txt .xyz .csv .tsv .asc, .dat where the first line may be a title, also .gz), one contour or several:
  *   blocks of lines "x y" or "x y z" parted by blank lines; or each after a line "contour N" (N points follow); or
  *   with a line of names above the numbers, of which x y z, t or "parameter", w or "weight" and contour or "curve"
- *   (its number or name; rows of one contour need not be neighbours) are taken.
+ *   (its number or name; rows of one contour need not be neighbours) are taken. A .dat whose first numbers are as
+ *   many points as two surfaces of an airfoil have (Lednicer's tables: each from the nose) becomes one contour from
+ *   the trailing edge along the first surface to the nose and back along the second.
  * Numbers are taken as they are: whether contours are closed is for the caller to know, who may find the first point
  * once more at the end. Points with z lie in one plane for each contour, to 1e-6 of its longest side. Where a
  * coordinate is constant, in all contours if there is one, the plane's axes are the other two in the order x y, x z,
