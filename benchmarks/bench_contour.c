@@ -5,7 +5,7 @@
  * 1. Growth: 100 to 100,000 points with spans in proportion, up to 2,000: times of the parts, one thread.
  * 2. Random cases: 20 to 2,000 points, degrees 2 to 6, C^1 and C^2, 0 to 6 inflections, noise to 5 %; with the
  *    inflections given, and found. What is proven, whether a second round is ever worse, the sum of squares beside
- * that without inequalities, and which construction the first reference is from. CSV lines start with "csv,". */
+ *    that without inequalities, and how often construction 1 stands in for 2. CSV lines start with "csv,". */
 #include <batten/batten.h>
 #include <batten/contour.h>
 #include <stdio.h>
@@ -117,7 +117,7 @@ enum { MEASURES = 5 };
 
 typedef struct tally {
   size_t tried, proven, accepted, refused, unproven, failed; /* refused: the data have another shape */
-  size_t worse, legs, below, right;                          /* right: as many inflections as the curve has */
+  size_t worse, fallbacks, below, right;                     /* right: as many inflections as the curve has */
   size_t done;
   size_t noisy, exact;
   double *ratios, *reference, *seconds, *rows; /* ratios: of noisy cases, two coordinates an unknown at least */
@@ -147,7 +147,7 @@ static void count_fit(tally *t, uint64_t seed, const contour_rule *rule, const c
   t->refused += st == BATTEN_W_SHAPE;
   t->unproven += st == BATTEN_W_ACCURACY;
   t->proven += f->shape.certified != 0;
-  t->legs += f->construction == 1;
+  t->fallbacks += f->fallback != 0;
   t->below += f->lsq <= f->lsq_reference;
   t->right += f->inflections_found == s->inflection_count;
   for (unsigned r = 1; r < f->rounds && r < BATTEN_CONTOUR_ROUNDS_MAX; r++)
@@ -173,9 +173,10 @@ static void print_tally(tally *t) {
   printf("proven %zu of %zu: accepted %zu, refused for their shape %zu, not proven %zu; failed %zu\n", t->proven,
          t->tried, t->accepted, t->refused, t->unproven, t->failed);
   printf(
-      "a later round worse than the one before: %zu; reference by directions of legs: %zu; no worse than the first "
+      "a later round worse than the one before: %zu; knot removal gave no reference, legs stood in: %zu; no worse "
+      "than the first "
       "reference: %zu; as many inflections as the true curve: %zu\n",
-      t->worse, t->legs, t->below, t->right);
+      t->worse, t->fallbacks, t->below, t->right);
   printf("| | least | 10 %% | median | 90 %% | 99 %% | most |\n|---|---|---|---|---|---|---|\n");
   static const char *const names[MEASURES] = {
       "noise, two coordinates an unknown or more: sum / sum without inequalities",

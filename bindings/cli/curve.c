@@ -78,7 +78,7 @@ static const cli_option table[] = {
     {"tension", OPT_TENSION, "W", "weight of stiffness beside the mean square distance; default 1e-12"},
     {"margin", OPT_MARGIN, "M", "inequalities hold by this part of what the reference has; default 1e-3"},
     {"construction", OPT_CONSTRUCTION, "N",
-     "of the reference: 1 (directions of legs), 2 (removal of knots); default 2, else 1"},
+     "of the reference: 1 (directions of legs), 2 (removal of knots); default: the nearer of both"},
     {"unit", OPT_UNIT, "NAME", "of lengths in STEP and IGES: mm, cm, m or inch; default mm"},
     {"deviation", OPT_DEVIATION, "T", "of polylines and points from the curve; default 1e-4 of its size"},
     CLI_OPTION_SIZE,

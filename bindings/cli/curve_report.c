@@ -33,7 +33,7 @@ static totals add_up(const curve_work *w) {
     t.found += i->inflections_found;
     t.found_free += i->inflections_unconstrained;
     t.rounds = i->rounds > t.rounds ? i->rounds : t.rounds;
-    t.fallbacks += i->construction == 1;
+    t.fallbacks += i->fallback != 0;
     t.unconstrained += i->lsq_unconstrained;
     t.first += i->lsq_unconstrained_first;
     t.reference += i->lsq_reference;

@@ -92,7 +92,8 @@ void contour_input_free(batten_context *ctx, contour_input *in);
 /* Breaks of `spans` pieces or (spans = 0) as many as it takes for all points to be within tolerance, or (tolerance =
  * 0) as the data speak for, without inequalities; every run between inflections (given, in [0, 1], ascending, of
  * closed curves maybe 0) has enough pieces for the reference (smoothness 2: two between inflections). Inflections are
- * breaks. *breaks [*pieces + 1], batten's; parameters [count] in [0, 1], not decreasing. Fails: NOMEM, TOO_LARGE, CANCELLED. */
+ * breaks. *breaks [*pieces + 1], batten's; parameters [count] in [0, 1], not decreasing. Fails: NOMEM, TOO_LARGE,
+ * CANCELLED. */
 typedef struct contour_knots_options {
   unsigned degree, smoothness;
   bool closed;
@@ -156,27 +157,29 @@ double contour_sum(const bspline *b, const double *control, const contour_data *
 
 /* ---- reference (reference*.c) -------------------------------------------------------------------- */
 
-typedef struct contour_reference {
-  double *control;       /* [n][2] of the degree of the shape; the caller's memory */
-  unsigned construction; /* that gave it: 1 or 2 */
-} contour_reference;
-
-/* A curve of the wanted shape in the space of the fit, that satisfies the ends, is near the data, and that
- * contour_rows_make accepts. construction 1, 2, or 0: both are made, and the one with the lower sum of squares is
- * kept. Fails: INFEASIBLE (the ends contradict the shape; says how), NOMEM, CANCELLED. Without fixed ends construction
- * 1 does not fail. */
-batten_status contour_reference_find(batten_context *ctx, const contour_shape *shape, const contour_space *space,
-                                     const contour_ends *ends, const contour_data *data, const double *parameters,
-                                     unsigned construction, double tension, contour_reference *out);
-
-/* ---- inequalities (wedges.c, rows.c) ------------------------------------------------------------- */
-
 typedef struct contour_row_options {
   double gap;         /* between wedges, radians; where the reference is nearly straight, half of what it can be */
   unsigned depth_max; /* bisections of a span */
   double margin;
   size_t row_limit;
 } contour_row_options;
+
+typedef struct contour_reference {
+  double *control;       /* [n][2] of the degree of the shape; the caller's memory */
+  unsigned construction; /* that gave it: 1 or 2 */
+  bool fallback;         /* 1, for 2 was asked, too, and gave none */
+} contour_reference;
+
+/* A curve of the wanted shape in the space of the fit, that satisfies the ends, is near the data, and that
+ * contour_rows_make accepts with the same `rows`. construction 1, 2, or 0: both are made, and the one with the lower
+ * sum of squares is kept. Fails: INFEASIBLE (the ends contradict the shape, or rows are too strict; says how), NOMEM,
+ * TOO_LARGE, CANCELLED. */
+batten_status contour_reference_find(batten_context *ctx, const contour_shape *shape, const contour_space *space,
+                                     const contour_ends *ends, const contour_data *data, const double *parameters,
+                                     unsigned construction, double tension, const contour_row_options *rows,
+                                     contour_reference *out);
+
+/* ---- inequalities (wedges.c, rows.c) ------------------------------------------------------------- */
 
 /* A piece [from, to] of span mu with the directions u, v that separate its differences [Lemma, eq. 3]. */
 typedef struct contour_wedge {

@@ -243,10 +243,11 @@ static batten_status find_reference(fit *f) {
   batten_status st = batten_progress(f->ctx, "reference", 0);
   if (st >= 0)
     st = contour_reference_find(f->ctx, &f->layout.shape, &f->space, &f->ends, &f->data, f->in.parameters,
-                                f->opt->construction, f->opt->tension, &r);
+                                f->opt->construction, f->opt->tension, &f->row_options, &r);
   f->info.time_reference_s = batten_now() - start;
   if (st < 0) return st;
   f->info.construction = r.construction;
+  f->info.fallback = r.fallback;
   f->info.lsq_reference = unscaled(f, contour_sum(&f->space.b, f->reference, &f->data, f->in.parameters));
   memcpy(f->shaped.parameters, f->in.parameters, f->in.count * sizeof *f->in.parameters);
   offer(f, &f->shaped, f->reference, f->in.parameters);

@@ -19,9 +19,9 @@ batten_contour_options batten_contour_options_default(void) {
                                   .rounds_tol = 1e-3,
                                   .correction_passes = 3,
                                   .tension = 1e-12,
-                                  .blend = 0.1,
+                                  .blend = 0.05,
                                   .margin = 1e-3,
-                                  .gap = 0.02,
+                                  .gap = 0.1,
                                   .depth_max = 12,
                                   .row_limit = 2000000};
 }

@@ -76,10 +76,8 @@ void reference_assess(const contour_shape *shape, const bspline *b, const double
 
 batten_status reference_accept(batten_context *ctx, const reference_task *task, const bspline *b,
                                const double *reference, double *control, bool *accepted) {
-  /* Somewhat stricter than fits are by default, so that there is room beside the curve. */
-  static const contour_row_options rows = {.gap = 0.03, .depth_max = 10, .margin = 1e-3, .row_limit = SIZE_MAX};
   bspline_refine(b, 2, reference, &task->space->b, control);
-  return contour_rows_make(ctx, task->shape, &task->space->b, control, &rows, NULL, accepted, NULL);
+  return contour_rows_make(ctx, task->shape, &task->space->b, control, task->rows, NULL, accepted, NULL);
 }
 
 /* Whether some span has inflections at both ends. */
@@ -94,11 +92,27 @@ static bool ends_fixed(const contour_ends *ends) {
                    isnan(ends->tangent[1][0]));
 }
 
+/* The lowest degree that references can have: smoothness + 1, but that a cubic span with inflections at both ends is
+ * straight, and that a parabola alone has not enough legs for two tangents. */
+static unsigned least_degree(const contour_shape *shape, const contour_ends *ends) {
+  bool tangents = ends && !isnan(ends->tangent[0][0]) && !isnan(ends->tangent[1][0]);
+  unsigned least = shape->smoothness + 1;
+  bool more = shape->smoothness == 2 ? flat_span(shape) : shape->spans == 1 && tangents;
+  return more ? least + 1 : least;
+}
+
+static const char *why_none(const reference_task *task, unsigned construction) {
+  if (construction == 2) return "knot removal does not find one; allow construction 1";
+  if (ends_fixed(task->ends))
+    return "the fixed ends contradict the signs of curvature; free them, or change the inflections";
+  return "runs between inflections turn too far for their number of spans; give more knots, or raise opt.depth_max";
+}
+
 batten_status contour_reference_find(batten_context *ctx, const contour_shape *shape, const contour_space *space,
                                      const contour_ends *ends, const contour_data *data, const double *parameters,
-                                     unsigned construction, double tension, contour_reference *out) {
-  reference_task task = {shape, space, ends, data, parameters, tension, shape->smoothness + 1};
-  if (shape->smoothness == 2 && flat_span(shape)) task.degree = 4;
+                                     unsigned construction, double tension, const contour_row_options *rows,
+                                     contour_reference *out) {
+  reference_task task = {shape, space, ends, data, parameters, tension, rows, least_degree(shape, ends)};
   if (task.degree > shape->degree)
     return batten_fail(ctx, BATTEN_E_INFEASIBLE,
                        "inflections: between two of them a cubic piece is straight; give a knot between them, or "
@@ -112,13 +126,10 @@ batten_status contour_reference_find(batten_context *ctx, const contour_shape *s
   if (st >= 0 && construction != 2) st = reference_by_legs(ctx, &task, by_legs, &legs);
   if (st >= 0 && isinf(legs) && isinf(removal))
     st = batten_fail(ctx, BATTEN_E_INFEASIBLE, "no reference curve of the wanted shape: %s",
-                     construction == 2  ? "knot removal does not find one; allow construction 1"
-                     : ends_fixed(ends) ? "the fixed ends contradict the signs of curvature; free them or change the "
-                                          "inflections"
-                                        : "runs between inflections turn too far for their number of spans; give "
-                                          "more knots");
+                     why_none(&task, construction));
   if (st >= 0) {
     out->construction = legs < removal ? 1 : 2;
+    out->fallback = construction != 1 && isinf(removal);
     memcpy(out->control, legs < removal ? by_legs : by_removal, n * sizeof *out->control);
     st = batten_progress(ctx, "reference", 1);
   }

@@ -15,8 +15,8 @@ typedef struct reference_task {
   const contour_data *data;
   const double *parameters;
   double tension;
-  unsigned degree; /* of references: smoothness + 1; 4 where smoothness is 2 and a span has inflections at both ends,
-                      for cubics are straight there */
+  const contour_row_options *rows;
+  unsigned degree; /* the lowest that references can have: smoothness + 1, or one more */
 } reference_task;
 
 /* How clearly each span of a spline of a shape bends to its side: quality [spans] the least sine, with the sign of

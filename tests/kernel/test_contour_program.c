@@ -1,7 +1,7 @@
 /* The quadratic program of a round: kernel/contour/program.c. */
 #include "contour_curves.h"
 
-static const contour_row_options OPTIONS = {.gap = 0.02, .depth_max = 12, .margin = 1e-3, .row_limit = 2000000};
+static const contour_row_options OPTIONS = {.gap = 0.1, .depth_max = 12, .margin = 1e-3, .row_limit = 2000000};
 
 typedef struct problem {
   contour_test_curve c;

@@ -105,10 +105,12 @@ typedef struct trial {
   const contour_ends *ends;
   unsigned construction;
   double tension;
+  contour_row_options rows;
   /* results */
   contour_space space;
   double *control;
   unsigned by;
+  bool fallback;
   double rms, truth;
 } trial;
 
@@ -154,6 +156,7 @@ static trial trial_make(const contour_rule *r, unsigned degree, unsigned smoothn
   t.shape = (contour_shape){degree, smoothness, s->closed, n - 1, t.breaks, t.signs};
   t.data = (contour_data){s->count, s->points, NULL};
   t.tension = 1e-12;
+  t.rows = (contour_row_options){.gap = 0.1, .depth_max = 12, .margin = 1e-3, .row_limit = SIZE_MAX};
   return t;
 }
 
@@ -176,11 +179,13 @@ static batten_status trial_run(batten_context *ctx, trial *t) {
   batten_status st = contour_space_make(ctx, s, s->degree, s->smoothness == 2, t->ends, &t->space);
   if (st < 0) return st;
   t->control = malloc(2 * t->space.b.count * sizeof *t->control);
-  contour_reference out = {t->control, 0};
-  st = contour_reference_find(ctx, s, &t->space, t->ends, &t->data, t->parameters, t->construction, t->tension, &out);
+  contour_reference out = {.control = t->control};
+  st = contour_reference_find(ctx, s, &t->space, t->ends, &t->data, t->parameters, t->construction, t->tension,
+                              &t->rows, &out);
   if (st < 0) return st;
   contour_data truth = {t->data.count, t->scene.truth, NULL};
   t->by = out.construction;
+  t->fallback = out.fallback;
   t->rms = sqrt(contour_sum(&t->space.b, t->control, &t->data, t->parameters) / (double)t->data.count);
   t->truth = sqrt(contour_sum(&t->space.b, t->control, &truth, t->parameters) / (double)t->data.count);
   return st;
@@ -232,7 +237,7 @@ static void test_parabola(batten_context *ctx) {
 /* Every kind, degree and smoothness by both constructions. */
 static void test_random(batten_context *ctx) {
   enum { CASES = 300 };
-  size_t second = 0, first = 0, wrong = 0, failed = 0, better = 0, both = 0, nearer = 0;
+  size_t second = 0, first = 0, wrong = 0, failed = 0, better = 0, both = 0, nearer = 0, fallbacks = 0;
   double jump = 0, ratio = 0;
   for (uint64_t seed = 0; seed < CASES; seed++) {
     contour_rule r = contour_rule_random(seed + 5000);
@@ -258,7 +263,9 @@ static void test_random(batten_context *ctx) {
       if (t.shape.closed) jump = fmax(jump, seam(&t));
     }
     t.construction = 0;
-    if (rms[1] > 0 && rms[2] > 0 && trial_run(ctx, &t) >= 0) {
+    bool found = trial_run(ctx, &t) >= 0;
+    fallbacks += found && t.fallback;
+    if (found && rms[1] > 0 && rms[2] > 0) {
       nearer += t.rms == fmin(rms[1], rms[2]);
       both++;
       better += rms[2] < rms[1];
@@ -268,6 +275,8 @@ static void test_random(batten_context *ctx) {
   }
   T_CHECK(failed == 0 && first == CASES, "construction 1 serves in all of %d cases", CASES);
   T_CHECK(second >= CASES * 9 / 10, "construction 2 serves in %zu of %d", second, CASES);
+  T_CHECK(first == CASES && fallbacks == CASES - second, "construction 1 is called the fallback in the other %zu",
+          fallbacks);
   T_CHECK(wrong == 0, "all have the wanted signs");
   T_CHECK(both > 0 && nearer == both, "of both the nearer one is taken");
   T_RATIO(jump, 1e-9, "closed ones are smooth where they close");
@@ -332,6 +341,18 @@ static void test_ends(batten_context *ctx) {
   for (size_t i = 0; i < t.shape.spans; i++) t.signs[i] = -1;
   T_STATUS(trial_run(ctx, &t), BATTEN_E_INFEASIBLE, ctx, "the fixed ends contradict the signs");
   trial_free(ctx, &t);
+  /* One piece and both tangents: a parabola has no length of legs to choose, but a cubic has. */
+  t = trial_make(&arc, 3, 1, 1, 0);
+  for (size_t i = 0; i < t.data.count; i++)
+    for (int c = 0; c < 2; c++)
+      t.scene.points[2 * i + (size_t)c] = c ? -t.parameters[i] * (1 - t.parameters[i]) : t.parameters[i];
+  t.signs[0] = 1;
+  t.ends = &ends;
+  for (t.construction = 0; t.construction <= 2; t.construction++) {
+    T_OK(trial_run(ctx, &t), ctx);
+    T_CHECK(right_signs(&t), "an arc of one piece between fixed ends, construction %u", t.construction);
+  }
+  trial_free(ctx, &t);
 }
 
 /* Inflections at neighbouring breaks: straight for cubics, but not for degree 4. */
@@ -353,9 +374,35 @@ static void test_neighbours(batten_context *ctx) {
   t.construction = 0;
   T_OK(trial_run(ctx, &t), ctx);
   t.shape.degree = 3;
-  contour_reference out = {t.control, 0};
-  T_STATUS(contour_reference_find(ctx, &t.shape, &t.space, NULL, &t.data, t.parameters, 0, 0, &out),
+  contour_reference out = {.control = t.control};
+  T_STATUS(contour_reference_find(ctx, &t.shape, &t.space, NULL, &t.data, t.parameters, 0, 0, &t.rows, &out),
            BATTEN_E_INFEASIBLE, ctx, "a cubic piece is straight");
+  trial_free(ctx, &t);
+}
+
+/* Rows can be written around what is accepted, however strict they are to be; and fewer bisections are no failure of
+ * the fit but of the reference. */
+static void test_strict(batten_context *ctx) {
+  contour_rule r = {.kind = CONTOUR_WAVE, .count = 150, .inflections = 2, .noise = 0.02, .seed = 6};
+  trial t = trial_make(&r, 5, 2, 14, 1);
+  const double gaps[3] = {1e-6, 0.1, 0.49};
+  size_t found = 0, refused = 0, kept = 0;
+  for (int g = 0; g < 3; g++)
+    for (unsigned depth = 0; depth <= 12; depth += 3) {
+      t.rows.gap = gaps[g];
+      t.rows.depth_max = depth;
+      batten_status st = trial_run(ctx, &t);
+      if (st < 0) {
+        refused += st == BATTEN_E_INFEASIBLE;
+        continue;
+      }
+      bool accepted = false;
+      found++;
+      T_OK(contour_rows_make(ctx, &t.shape, &t.space.b, t.control, &t.rows, NULL, &accepted, NULL), ctx);
+      kept += accepted;
+    }
+  T_CHECK(found + refused == 15 && kept == found && found >= 12, "strict rows: %zu references, %zu with rows", found,
+          kept);
   trial_free(ctx, &t);
 }
 
@@ -481,6 +528,7 @@ int main(void) {
   test_spirals(ctx);
   test_ends(ctx);
   test_neighbours(ctx);
+  test_strict(ctx);
   test_bad_data(ctx);
   test_large(ctx);
   test_invariance(ctx);

@@ -1,7 +1,7 @@
 /* Inequalities around a reference curve: kernel/contour/wedges.c and rows.c. */
 #include "contour_curves.h"
 
-static const contour_row_options OPTIONS = {.gap = 0.02, .depth_max = 12, .margin = 1e-3, .row_limit = 2000000};
+static const contour_row_options OPTIONS = {.gap = 0.1, .depth_max = 12, .margin = 1e-3, .row_limit = 2000000};
 
 /* A random point of the space, as far from the reference as the rows allow times `part`. */
 static void wander(const contour_space *space, const contour_rows *rows, const double *reference, double part,

@@ -73,13 +73,14 @@ typedef struct batten_contour_options {
                      keeps places without data calm. Default 1e-12. */
 
   /* The inequalities. */
-  unsigned construction; /* of the reference: 1 directions of legs, 2 knot removal; 0 = 2, and 1 where that fails.
-                            Default 0. */
-  double blend;          /* part of the old reference in the new one, (0, 1). Default 0.1. */
+  unsigned construction; /* of the first reference: 1 prescribed directions of legs, 2 knot removal, 0 = both, and the
+                            one that is nearer to the points. Default 0. */
+  double blend;          /* part of the old reference in the new one, (0, 1). Default 0.05. */
   double margin;         /* every inequality holds by this part of what the reference has, (0, 1): curvature is not 0.
                             Default 1e-3. */
   double gap;            /* a piece is accepted when the wedges of its first and second differences are so far apart,
-                            radians, (0, 0.5). Default 0.02. */
+                            radians, (0, 0.5), or half as far as they can be: larger ones mean more rows, and a little
+                            lower sums. Default 0.1. */
   unsigned depth_max;    /* bisections of spans, 0 .. 20. Default 12. */
   size_t row_limit;      /* most inequalities, >= 1. Default 2000000. */
 } batten_contour_options;
@@ -102,6 +103,7 @@ typedef struct batten_contour_info {
   double rms, max_error;            /* of the result: distances of points from their places */
   size_t max_error_index;           /* that point */
   unsigned construction;            /* that gave the first reference: 1 or 2 */
+  int fallback;                     /* non-zero: construction 2 gave none of the wanted shape, and 1 stood in */
   unsigned rounds;                  /* that were run */
   unsigned round_best;              /* that gave the result, 0 = the reference already */
   size_t equalities;                /* that were eliminated: x'' = 0 at inflections, ends, two each */
