@@ -105,8 +105,8 @@ typedef struct contour_knots_options {
 batten_status contour_knots_place(batten_context *ctx, const contour_data *data, const double *parameters,
                                   const contour_knots_options *opt, size_t *pieces, double **breaks);
 
-/* Up to `passes` steps of each point to a nearer place; parameters [count] stay in [0, 1] (closed: go round). No
- * distance rises. squares [count]: squared distances from the new places. On the context's threads. */
+/* Up to `passes` steps of each point to a nearer place; parameters [count] stay in [0, 1] (closed: go round). The first
+ * point at 0 and the last at 1 stay there (but closed). No distance rises. squares [count]: squared distances from the new places. On the context's threads. */
 void contour_correct(batten_context *ctx, const bspline *space, bool closed, const double *control,
                      const contour_data *data, unsigned passes, double *parameters, double *squares);
 

@@ -2,7 +2,10 @@
  *
  * A step is Newton's for half the squared distance; where that has no minimum Gauss and Newton's, or as long as the
  * curvature of the square says. It is halved until the distance drops, or not made. It may lead into other spans; the
- * ends of open curves hold points that are beyond them, closed curves go round. */
+ * ends of open curves hold points that are beyond them, closed curves go round.
+ *
+ * The first and last points of open curves stay at the ends. Were they free, no point would hold an end: each round
+ * they might go farther inside, and the curve run on beyond the data. */
 #include "contour_inner.h"
 
 #include "base/checked.h"
@@ -82,12 +85,18 @@ static double newton_step(double jet[3][2], const double e[2]) {
   return curve > 0 ? -slope / curve : 0;
 }
 
-static double correct_point(const job *j, const double *point, size_t *span, double *parameter) {
+/* Whether point i is to stay: the first and the last at the ends of an open curve. */
+static bool held(const job *j, size_t i) {
+  if (j->closed) return false;
+  return (i == 0 && j->parameters[i] == 0) || (i + 1 == j->data->count && j->parameters[i] == 1);
+}
+
+static double correct_point(const job *j, unsigned passes, const double *point, size_t *span, double *parameter) {
   double jet[3][2], next[3][2], e[2], off[2];
   size_t mu = *span = walk(j->space, *span, *parameter);
   curve_jet(j->space, j->control, mu, *parameter, jet);
   double square = square_of(jet, point, e);
-  for (unsigned pass = 0; pass < j->passes; pass++) {
+  for (unsigned pass = 0; pass < passes; pass++) {
     double step = newton_step(jet, e), there = *parameter, less = square;
     step = fmin(fmax(step, -0.5), 0.5); /* no farther than round half a closed curve */
     bool nearer = false;
@@ -114,7 +123,7 @@ static void correct_task(void *arg, size_t index) {
   size_t begin = index * CHUNK, end = begin + CHUNK < j->data->count ? begin + CHUNK : j->data->count;
   size_t span = bspline_span(j->space, j->parameters[begin]);
   for (size_t i = begin; i < end; i++)
-    j->squares[i] = correct_point(j, j->data->points + 2 * i, &span, j->parameters + i);
+    j->squares[i] = correct_point(j, held(j, i) ? 0 : j->passes, j->data->points + 2 * i, &span, j->parameters + i);
 }
 
 void contour_correct(batten_context *ctx, const bspline *space, bool closed, const double *control,

@@ -81,6 +81,7 @@ static void check_steps(batten_context *ctx, unsigned degree, unsigned smoothnes
       right -= floor(right);
     }
     if (!closed) held += t == 0 || t == 1;
+    if (!closed && (t == 0 || t == 1) && (i == 0 || i + 1 == COUNT)) continue; /* these stay */
     round += fabs(t - r->start[i]) > 0.5;
     for (int side = 0; side < 2; side++) {
       double at = side ? right : left;
@@ -111,6 +112,25 @@ static void check_return(batten_context *ctx, unsigned degree) {
   T_CHECK(memcmp(r->t, r->start, sizeof r->t) == 0, "no pass moves nothing");
   T_RATIO(wrong, 1e-14, "and tells squares");
   free(r);
+}
+
+/* The first and last points stay at the ends of an open curve, also where places inside are nearer; their squares are
+ * told. From inside they move, and those of a closed curve do. */
+static void test_held(batten_context *ctx) {
+  const double knots[] = {0, 0, 0, 1, 1, 1}, control[] = {-1, 1, 0, -1, 1, 1}; /* x = 2 t - 1, y = x^2 */
+  const bspline b = {2, 3, knots};
+  const double points[] = {-0.5, 0.25, -0.5, 0.25, 0.5, 0.25, 0.5, 0.25};
+  contour_data data = {4, points, NULL};
+  for (int way = 0; way < 3; way++) {
+    double t[] = {0, 0, 1, 1}, squares[4];
+    if (way == 1) t[0] = 0.01, t[3] = 0.99;
+    contour_correct(ctx, &b, way == 2, control, &data, 20, t, squares);
+    double first = way ? 0.25 : 0, square = way ? 0 : 0.8125; /* (-1, 1) - (-0.5, 0.25) */
+    T_RATIO(fabs(t[0] - first) + fabs(t[3] - 1 + first), 1e-12, "%s: the first and last points' places",
+            way == 0 ? "at the ends they stay" : way == 1 ? "from inside they move" : "closed: they move");
+    T_RATIO(fabs(squares[0] - square) + fabs(squares[3] - square), 1e-12, "their squares");
+    T_RATIO(fabs(t[1] - 0.25) + fabs(t[2] - 0.75), 1e-12, "others leave the ends");
+  }
 }
 
 /* By hand: the parabola (t, t^2), and a point right above its lowest place. */
@@ -174,6 +194,7 @@ static void test_time(batten_context *ctx) {
 int main(void) {
   batten_context *ctx = t_context(NULL, NULL, 1);
   test_by_hand(ctx);
+  test_held(ctx);
   for (unsigned degree = 2; degree <= 9; degree++)
     for (unsigned smoothness = 1; smoothness <= 2 && smoothness < degree; smoothness++)
       for (int closed = 0; closed < 2; closed++) check_steps(ctx, degree, smoothness, closed);

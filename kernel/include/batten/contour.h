@@ -67,8 +67,9 @@ typedef struct batten_contour_options {
 
   unsigned rounds;   /* of inequalities, quadratic program and parameter correction, 1 .. 100. Default 10. */
   double rounds_tol; /* >= 0. A round that lowers the sum of squares by a smaller part is the last. Default 1e-3. */
-  unsigned correction_passes; /* of parameter correction (nearest places) in each round, 0 = parameters stay.
-                                 Default 3. */
+  unsigned correction_passes; /* of parameter correction (nearest places) in each round, 0 = parameters stay. The
+                                 first and last points of open curves stay at the ends of the domain, where they are
+                                 there: else the curve might run on beyond them. Default 3. */
   double tension; /* weight of the integral of |x''|^2 beside the mean square distance, domain [0, 1], >= 0. What
                      keeps places without data calm. Default 1e-12. */
 
