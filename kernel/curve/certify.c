@@ -192,10 +192,15 @@ static tangent tangent_of(const bend *noisy, bool upper) {
   return (tangent){{noisy->a[k][0], noisy->a[k][1]}, noisy->a_error[k]};
 }
 
-/* The sign that most of the first span has. */
-static int sign_of(const bend *b) {
-  double sum = 0;
-  for (unsigned i = 0; i <= b->n; i++) sum += b->g[i];
+/* The part of the extent up to `at`. */
+static double part_of(const extent *e, double at) { return (at - e->from) / (e->to - e->from); }
+
+/* The sign that most of the first span has, up to its first inflection. */
+static int sign_of(const certifier *c, const extent *e) {
+  bend b = e->b, rest;
+  double s = c->next < c->opt->inflection_count ? part_of(e, c->opt->inflections[c->next]) : 1, sum = 0;
+  if (s > 0 && s < 1) bend_split(&b, s, &rest);
+  for (unsigned i = 0; i <= b.n; i++) sum += b.g[i];
   return sum < 0 ? -1 : 1;
 }
 
@@ -204,7 +209,7 @@ static void begin_span(certifier *c, const joint *left, const extent *e) {
   tangent start = tangent_of(&e->noisy, false);
   if (left->wanted > 1) c->proof.failed = true;
   if (c->first_sign == 0) {
-    c->first_sign = c->sign = c->opt->sign ? c->opt->sign : sign_of(&e->b);
+    c->first_sign = c->sign = c->opt->sign ? c->opt->sign : sign_of(c, e);
     c->first = start;
     return;
   }
@@ -215,7 +220,7 @@ static void begin_span(certifier *c, const joint *left, const extent *e) {
 
 /* The part up to an inflection inside the span; e becomes the rest. */
 static void prove_up_to(certifier *c, extent *e, double at) {
-  double s = (at - e->from) / (e->to - e->from);
+  double s = part_of(e, at);
   if (!(s > 0 && s < 1)) {
     c->proof.failed = true;
     return;
@@ -240,7 +245,9 @@ static joint certify_span(certifier *c, size_t mu, size_t next, const joint *lef
   begin_span(c, left, &e);
   if (left->wanted) e.zero[0] = left->zero;
   e.offset[0] = left->offset;
-  double last = knots[1] - reach_of(c, mu);
+  /* At the end of an open curve there is no joint that could have it. */
+  bool open_end = next >= c->curve->space.count && !c->curve->closed;
+  double last = open_end ? knots[1] : knots[1] - reach_of(c, mu);
   for (; c->next < c->opt->inflection_count && at[c->next] < last; c->next++) prove_up_to(c, &e, at[c->next]);
   joint right = next < c->curve->space.count ? joint_after(c, mu, next) : c->ends;
   if (right.wanted) e.zero[1] = right.zero;

@@ -258,12 +258,47 @@ static void test_bad(batten_context *ctx) {
   t_fail_every_allocation("batten_curve_certify", call, &c);
 }
 
+/* An inflection that is wanted where the curve has none is never certified, at its ends neither, however large the
+ * slack; and without a given sign the start has the one before the first inflection, wherever that is. */
+static void test_ends(batten_context *ctx) {
+  curve_case arc = {
+      .degree = 3, .knot_count = 8, .knots = {0, 0, 0, 0, 1, 1, 1, 1}, .control = {{0, 0}, {1, 0}, {2, 1}, {2, 2}}};
+  static const double slacks[] = {1e-9, 1e-3, 0.3, 2}, places[] = {1e-10, 1e-3, 0.2, 0.8, 0.999, 1 - 1e-10};
+  size_t believed = 0, refused = 0;
+  batten_curve *curve = curve_case_make(ctx, &arc);
+  for (int i = 0; i < 24; i++)
+    for (int sign = -1; sign <= 1; sign++) {
+      batten_curve_shape_options o = batten_curve_shape_options_default();
+      batten_curve_shape shape = {.certified = -1};
+      o.sign = sign;
+      o.slack = slacks[i / 6];
+      o.inflection_count = 1;
+      o.inflections = &places[i % 6];
+      if (batten_curve_certify(ctx, curve, &o, &shape) < 0 || shape.certified) believed++;
+    }
+  batten_curve_free(curve);
+  T_CHECK(believed == 0, "inflections that an arc does not have: %zu of 72 believed", believed);
+  /* [x', x''] is a positive multiple of at - t. */
+  for (int k = 1; k < 32; k++) {
+    double at = k / 32.0;
+    curve_case c = arc;
+    for (int j = 0; j <= 3; j++) {
+      c.control[j][0] = j / 3.0; /* x = t */
+      c.control[j][1] = j == 2 ? at : j == 3 ? 3 * at - 1 : 0;
+    }
+    batten_curve_shape shape = certify(ctx, &c, 0, 1, &at);
+    if (!shape.certified || shape.sign != 1) refused++;
+  }
+  T_CHECK(refused == 0, "graphs t^2 (3 at - t) without a sign: %zu refused", refused);
+}
+
 int main(void) {
   batten_context *ctx = t_context(NULL, NULL, 1);
   test_convex(ctx);
   test_random(ctx);
   test_sharpness(ctx);
   test_edges(ctx);
+  test_ends(ctx);
   test_units(ctx);
   test_bad(ctx);
   batten_context_free(ctx);
