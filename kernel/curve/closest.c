@@ -334,21 +334,14 @@ static batten_status check(batten_context *ctx, const batten_curve *curve, size_
   return BATTEN_OK;
 }
 
-/* The box of the control points, from which no point may be further than a double can say. */
+/* No point may be further from the box of the control points than a double can say. */
 static batten_status check_far(batten_context *ctx, job *j) {
-  const batten_curve *c = j->curve;
-  for (size_t k = 0; k < 2; k++) {
-    double lower = INFINITY, upper = -INFINITY;
-    for (size_t i = 0; i < c->space.count; i++) {
-      lower = fmin(lower, c->control_points[2 * i + k]);
-      upper = fmax(upper, c->control_points[2 * i + k]);
-    }
-    j->middle[k] = 0.5 * lower + 0.5 * upper;
-    for (size_t i = k; i < 2 * j->count; i += 2)
-      if (!isfinite(j->points[i] - lower) || !isfinite(j->points[i] - upper))
-        return batten_fail(ctx, BATTEN_E_INVALID, "points[%zu][%zu]: %g; its distance is beyond a double", i / 2, k,
-                           j->points[i]);
-  }
+  double lower[2], upper[2];
+  curve_points_box(j->curve->space.count, j->curve->control_points, lower, upper);
+  for (size_t i = 0; i < 2 * j->count; i++)
+    if (!isfinite(j->points[i] - lower[i % 2]) || !isfinite(j->points[i] - upper[i % 2]))
+      return batten_fail(ctx, BATTEN_E_INVALID, "points[%zu][%zu]: %g; its distance is beyond a double", i / 2, i % 2,
+                         j->points[i]);
   return BATTEN_OK;
 }
 
@@ -390,6 +383,7 @@ static batten_status plan(batten_context *ctx, job *j) {
   if (st < 0) return st;
   j->spans = bspline_span_count(&j->curve->space);
   if (j->spans > UINT32_MAX) return batten_fail(ctx, BATTEN_E_TOO_LARGE, "curve: %zu spans are too many", j->spans);
+  curve_find_middle(j->curve, j->middle);
   make_weights(j);
   size_t tasks = j->count / QUERIES + 1;
   box3 *boxes = batten_alloc_array(ctx, j->spans, sizeof *boxes);

@@ -6,18 +6,21 @@
 
 #include <string.h>
 
+void curve_points_box(size_t count, const double *points, double lower[2], double upper[2]) {
+  for (size_t x = 0; x < 2; x++) {
+    lower[x] = upper[x] = points[x];
+    for (size_t i = 1; i < count; i++) {
+      lower[x] = fmin(lower[x], points[2 * i + x]);
+      upper[x] = fmax(upper[x], points[2 * i + x]);
+    }
+  }
+}
+
 /* The larger side of the points' box. */
 static double box_size(size_t count, const double *points) {
-  double size = 0;
-  for (size_t d = 0; d < 2; d++) {
-    double lower = points[d], upper = points[d];
-    for (size_t i = 1; i < count; i++) {
-      lower = fmin(lower, points[2 * i + d]);
-      upper = fmax(upper, points[2 * i + d]);
-    }
-    size = fmax(size, upper - lower);
-  }
-  return size;
+  double lower[2], upper[2];
+  curve_points_box(count, points, lower, upper);
+  return fmax(upper[0] - lower[0], upper[1] - lower[1]);
 }
 
 batten_status curve_make(batten_context *ctx, const bspline *space, const double *points, bool closed,

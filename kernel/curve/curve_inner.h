@@ -29,11 +29,14 @@ struct batten_curve {
 batten_status curve_make(batten_context *ctx, const bspline *space, const double *points, bool closed,
                          batten_curve **out);
 
+/* The box of points [count][2], count > 0. */
+void curve_points_box(size_t count, const double *points, double lower[2], double upper[2]);
+
 /* x, x', x'' at t on span mu (at its ends from within): jet [order + 1][2]. points [count][2]. */
 void curve_jet(const bspline *space, const double *points, size_t mu, double t, unsigned order, double (*jet)[2]);
 
-/* The same with derivatives by 2^e t of 2^curve->exponent times the curve (not its point), so that the span is about 1
- * long. Returns e. */
+/* The same with derivatives by 2^e t of 2^curve->exponent times the curve (not its point), so that the span is about
+ * 1 long. Returns e. */
 int curve_jet_scaled(const batten_curve *curve, size_t mu, double t, unsigned order, double (*jet)[2]);
 /* Of its x': the length, 0 with tangent 0 where it is below rounding. exponent: that e. */
 double curve_tangent(const batten_curve *curve, size_t mu, int exponent, const double first[2], double tangent[2]);

@@ -56,15 +56,9 @@ void curve_piece_make(const batten_curve *curve, size_t mu, const double middle[
 }
 
 void curve_find_middle(const batten_curve *curve, double middle[2]) {
-  const double *p = curve->control_points;
-  for (size_t x = 0; x < 2; x++) {
-    double lower = p[x], upper = p[x];
-    for (size_t i = 1; i < curve->space.count; i++) {
-      lower = fmin(lower, p[2 * i + x]);
-      upper = fmax(upper, p[2 * i + x]);
-    }
-    middle[x] = lower + 0.5 * (upper - lower);
-  }
+  double lower[2], upper[2];
+  curve_points_box(curve->space.count, curve->control_points, lower, upper);
+  for (int x = 0; x < 2; x++) middle[x] = lower[x] + 0.5 * (upper[x] - lower[x]);
 }
 
 double curve_span_at(const bspline *space, size_t mu, double u) {

@@ -32,15 +32,13 @@ static batten_status refine(batten_context *ctx, const bspline *from, const doub
   return st;
 }
 
-/* Knots that differ must still do so after they were moved, or they could become too frequent. */
-static batten_status check_moved(batten_context *ctx, const char *name, size_t count, const double *old,
-                                 const double *moved) {
+/* Knots that differ must still do so after they were moved, or they could become too frequent. remedy: what to do. */
+static batten_status check_moved(batten_context *ctx, const char *name, const char *remedy, size_t count,
+                                 const double *old, const double *moved) {
   for (size_t k = 1; k < count; k++)
     if (old[k - 1] != old[k] && moved[k - 1] == moved[k])
-      return batten_fail(ctx, BATTEN_E_INVALID,
-                         "%s: knots %.17g and %.17g would both be %.17g there; first transform the curve to a domain "
-                         "in which its spans are less different",
-                         name, old[k - 1], old[k], moved[k]);
+      return batten_fail(ctx, BATTEN_E_INVALID, "%s: knots %.17g and %.17g would both be %.17g there; %s", name,
+                         old[k - 1], old[k], moved[k], remedy);
   return BATTEN_OK;
 }
 
@@ -161,7 +159,8 @@ static batten_status unroll(batten_context *ctx, const batten_curve *curve, bspl
   *space = (bspline){d, count, knots};
   *points = control;
   return isfinite(knots[all - 1] - knots[0])
-             ? check_moved(ctx, "to", b->count - d, b->knots + d + 1, knots + seam + d)
+             ? check_moved(ctx, "to", "take the parts before and after the start of the domain one by one",
+                           b->count - d, b->knots + d + 1, knots + seam + d)
              : batten_fail(ctx, BATTEN_E_INVALID, "to: two periods are beyond a double; stay within one");
 }
 
@@ -209,7 +208,7 @@ static batten_status cut(batten_context *ctx, const bspline *b, const double *po
   double *part = knots + all, shift = named[0] - ends[0];
   for (size_t k = 0; k < inner + 2 * ((size_t)d + 1); k++)
     part[k] = k <= d ? named[0] : k > inner + d ? named[1] : knots[start + k - d] + shift;
-  st = check_moved(ctx, "from", inner + 2, knots + start, part + d);
+  st = check_moved(ctx, "from", "give one inside the domain", inner + 2, knots + start, part + d);
   if (st < 0) goto done;
   const bspline space = {d, inner + d + 1, part};
   st = curve_make(ctx, &space, control + 2 * (start - d), false, out);
@@ -291,7 +290,8 @@ batten_status batten_curve_reverse(batten_context *ctx, const batten_curve *curv
     knots[k] = t == lower ? upper : lower + (upper - t);
     old[k] = t;
   }
-  st = check_moved(ctx, "curve", all, old, knots);
+  st = check_moved(ctx, "curve", "its spans are too different in length; give it knots that are further apart", all,
+                   old, knots);
   if (st < 0) goto done;
   for (size_t i = 0; i < b->count; i++)
     memcpy(points + 2 * i, curve->control_points + 2 * (b->count - 1 - i), 2 * sizeof *points);
@@ -311,7 +311,7 @@ static batten_status map_knots(batten_context *ctx, const bspline *b, const doub
     double moved = isnormal(by) ? domain[0] + from * by : bspline_blend(domain[0], domain[1], from / (upper - lower));
     out[k] = t == upper ? domain[1] : fmin(moved, domain[1]);
   }
-  return check_moved(ctx, "domain", knot_count(b), b->knots, out);
+  return check_moved(ctx, "domain", "give one in which short spans are nearer to 0", knot_count(b), b->knots, out);
 }
 
 static batten_status check_transform(batten_context *ctx, const double *matrix, const double *shift,

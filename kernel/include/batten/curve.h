@@ -62,15 +62,18 @@ BATTEN_API batten_status batten_curve_insert_knots(batten_context *ctx, const ba
 BATTEN_API batten_status batten_curve_elevate(batten_context *ctx, const batten_curve *curve, unsigned degree,
                                               batten_curve **out);
 /* The part from one parameter to another, not closed, with the same parameters. of a closed curve to <= from + period
- * may lie beyond the end. Fails: INVALID (from >= to, outside), NOMEM. */
+ * may lie beyond the end. Fails: INVALID (from >= to, outside; where distinct knots would become equal, moved by
+ * periods far from 0), NOMEM, TOO_LARGE. */
 BATTEN_API batten_status batten_curve_part(batten_context *ctx, const batten_curve *curve, double from, double to,
                                            batten_curve **out);
-/* Parts before and after t, inside the domain; both or none are made. */
+/* Parts before and after t, inside the domain; both or none are made. Fails: as batten_curve_part. */
 BATTEN_API batten_status batten_curve_split(batten_context *ctx, const batten_curve *curve, double t,
                                             batten_curve **before, batten_curve **after);
-/* Run through the other way, over the same domain. */
+/* Run through the other way, over the same domain. Fails: INVALID (knots near the start that are too near to each
+ * other to differ near the end), NOMEM. */
 BATTEN_API batten_status batten_curve_reverse(batten_context *ctx, const batten_curve *curve, batten_curve **out);
-/* x -> matrix x + shift (matrix row-major), t -> the domain [domain[0], domain[1]]. NULL: as it is. */
+/* x -> matrix x + shift (matrix row-major), t -> the domain [domain[0], domain[1]]. NULL: as it is. Fails: INVALID
+ * (not finite, points beyond a double, a domain in which knots would no longer differ), NOMEM. */
 BATTEN_API batten_status batten_curve_transform(batten_context *ctx, const batten_curve *curve,
                                                 const double matrix[4], const double shift[2], const double domain[2],
                                                 batten_curve **out);
@@ -130,8 +133,9 @@ BATTEN_API batten_status batten_curve_inflections(batten_context *ctx, const bat
  * there is exactly one zero. At knots that are there degree - 1 times, corners, and the ends of closed curves, x''
  * may jump: signs are proven up to them, but wrong ones that the rounding of the control points explains do not count
  * at a wanted inflection. At corners (knots that are there degree times) the tangent must turn by less than pi to the
- * side to which the curve bends there, or not at all to that rounding; so at the ends of closed curves. Knows nothing
- * of how the curve was made. Curves of degree 1 do not bend and are never certified. About 1 us a span of degree 3.
+ * side to which the curve bends there, or not at all to that rounding; so at the ends of closed curves. That
+ * rounding: 2^-50 of the largest coordinate of the control points. Knows nothing of how the curve was made. Curves of
+ * degree 1 do not bend and are never certified. About 1 us a span of degree 3.
  */
 typedef struct batten_curve_shape_options {
   size_t struct_size;
@@ -150,10 +154,11 @@ typedef struct batten_curve_shape {
   int certified;           /* non-zero: proven: the wanted signs, exactly the wanted inflections, x' nowhere 0 */
   int sign;                /* at the start when certified, else 0 */
   double margin_min;       /* With sigma the wanted sign and rho(t) = 1, but on a span with an inflection at which the
-                              curvature vanishes (|t - inflection| - inflection_error) / length of the span, of the nearest
-                              one: sigma curvature(t) >= margin_min rho(t) is proven, 1 / unit, and margin_min is at least
-                              nine tenths of the largest such number, as far as rounding lets that be proven. When not
-                              certified: the least that was met; 0 at corners that turn the wrong way */
+                              curvature vanishes (|t - inflection| - inflection_error) / length of the span, of the
+                              nearest one: sigma curvature(t) >= margin_min rho(t) is proven where rho(t) > 0, in
+                              1 / unit, and margin_min is at least nine tenths of the largest such number, as far as
+                              rounding lets that be proven. When not certified: the least that was met; 0 at corners
+                              that turn the wrong way */
   double worst_at;         /* where the least was met */
   double inflection_error; /* proven: so near to the wanted parameters the inflections lie, in parameters */
   size_t pieces;           /* that were looked at */
