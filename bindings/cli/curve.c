@@ -81,7 +81,7 @@ static const cli_option table[] = {
      "of the reference: 1 (directions of legs), 2 (removal of knots); default: the nearer of both"},
     {"unit", OPT_UNIT, "NAME", "of lengths in STEP and IGES: mm, cm, m or inch; default mm"},
     {"deviation", OPT_DEVIATION, "T", "of polylines and points from the curve; default 1e-4 of its size"},
-    CLI_OPTION_SIZE,
+    {"size", CLI_KEY_SIZE, "W,H", "picture's size in pixels; default 1600,1100, of several contours by their box"},
     CLI_OPTION_TITLE,
     CLI_OPTION_MEMORY,
     CLI_OPTION_THREADS,
@@ -440,7 +440,7 @@ int cli_curve(int argc, char **argv) {
                      .write = batten_write_curves_options_default(),
                      .picture = batten_picture_options_default()};
   q.picture.width = 1600;
-  q.picture.height = 1100;
+  q.picture.height = 0; /* as needed */
   int status = cli_command_run(&command, &q.common, argc, argv);
   free(q.list);
   return status;

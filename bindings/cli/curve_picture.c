@@ -124,21 +124,25 @@ static batten_status places(batten_context *ctx, const batten_curve *curve, doub
   return st;
 }
 
-/* Quills to the outer side of the bend; none is longer than `most`. */
+/* Quills to the outer side of the bend, and the line through their ends; none is longer than `most`. Between quills
+ * that line goes through further ends, since curvature changes within few of them at a nose. */
 static batten_status add_comb(batten_context *ctx, const batten_curve *curve, double length, size_t count,
                               double scale, double most, side *out) {
+  enum { FINER = 8 };
+  size_t ends = FINER * (count - 1) + 1;
   batten_curve_point *at = NULL;
-  batten_status st = places(ctx, curve, length, count, &at);
-  for (size_t i = 0; st >= 0 && i < count; i++) {
+  batten_status st = places(ctx, curve, length, ends, &at);
+  if (st >= 0) st = lines_reserve(ctx, &out->envelope, ends);
+  for (size_t i = 0; st >= 0 && i < ends; i++) {
     double k = isnan(at[i].curvature) ? 0 : fmax(-most, fmin(most, scale * at[i].curvature));
     double tip[2] = {at[i].point[0] + k * at[i].tangent[1], at[i].point[1] - k * at[i].tangent[0]};
+    lines_point(&out->envelope, tip[0], tip[1]);
+    if (i % FINER) continue;
     st = lines_reserve(ctx, &out->quills, 2);
-    if (st >= 0) st = lines_reserve(ctx, &out->envelope, 1);
     if (st < 0) break;
     lines_point(&out->quills, at[i].point[0], at[i].point[1]);
     lines_point(&out->quills, tip[0], tip[1]);
     lines_end(&out->quills);
-    lines_point(&out->envelope, tip[0], tip[1]);
   }
   if (st >= 0) lines_end(&out->envelope);
   batten_free(ctx, at);
@@ -178,8 +182,9 @@ static batten_status add_curvature(batten_context *ctx, const batten_curve *curv
 
 typedef struct drawing {
   const curve_work *w;
-  double size, length; /* of all results together */
-  double scale, most;  /* of combs */
+  double box[2], size, length; /* of all results together; size: the longer side of the box */
+  double scale, most;          /* of combs */
+  double bend;                 /* that nineteen of twenty places of the results do not exceed */
   lines data;
   side sides[2]; /* without inequalities, with them */
 } drawing;
@@ -194,8 +199,11 @@ static int ascending(const void *a, const void *b) {
   return (x > y) - (x < y);
 }
 
-/* Nineteen of twenty quills of the results are shorter than an eighth of the picture, and none is longer than a
- * third. */
+/* Many curves are drawn without what surrounds them: nobody could tell it apart. */
+static bool has_surroundings(const drawing *d) { return d->w->count <= 6; }
+
+/* Nineteen of twenty quills of the results are shorter than an eighth of the picture, of several less; none is longer
+ * than two and a half of that. */
 static batten_status find_scale(batten_context *ctx, drawing *d) {
   size_t count = 0, at = 0;
   for (size_t i = 0; i < d->w->count; i++) count += quills_of(d, d->w->items[i].measures.length);
@@ -211,9 +219,9 @@ static batten_status find_scale(batten_context *ctx, drawing *d) {
   }
   if (st >= 0) {
     qsort(sizes, count, sizeof *sizes, ascending);
-    double high = sizes[count - 1 - count / 20];
-    double length = (d->w->count == 1 ? 0.12 : 0.05) * d->size;
-    d->scale = high > 0 ? length / high : 0;
+    d->bend = sizes[count - 1 - count / 20];
+    double length = 0.12 / sqrt((double)d->w->count) * d->size;
+    d->scale = d->bend > 0 ? length / d->bend : 0;
     d->most = 2.5 * length;
   }
   batten_free(ctx, sizes);
@@ -232,9 +240,9 @@ static batten_status gather_side(batten_context *ctx, drawing *d, int which) {
       st = batten_curve_length(ctx, curve, f.knots[0], f.knots[f.knot_count - 1], &length);
     }
     if (st >= 0) st = add_polyline(ctx, curve, d->size / 4000, &s->curve);
-    if (st >= 0) st = add_polygon(ctx, curve, &s->polygon);
     if (st >= 0) st = add_inflections(ctx, curve, &s->inflections);
-    if (st >= 0) st = add_comb(ctx, curve, length, quills_of(d, length), d->scale, d->most, s);
+    if (st >= 0 && has_surroundings(d)) st = add_polygon(ctx, curve, &s->polygon);
+    if (st >= 0 && has_surroundings(d)) st = add_comb(ctx, curve, length, quills_of(d, length), d->scale, d->most, s);
     if (st >= 0 && d->w->count == 1) st = add_curvature(ctx, curve, &s->curvature);
   }
   return st;
@@ -254,7 +262,8 @@ static batten_status gather(batten_context *ctx, drawing *d) {
     for (size_t k = 0; st >= 0 && k < item->count; k++)
       lines_point(&d->data, item->points[2 * k], item->points[2 * k + 1]);
   }
-  d->size = fmax(upper[0] - lower[0], upper[1] - lower[1]);
+  for (int k = 0; k < 2; k++) d->box[k] = upper[k] - lower[k];
+  d->size = fmax(d->box[0], d->box[1]);
   if (st >= 0) st = find_scale(ctx, d);
   if (st >= 0) st = gather_side(ctx, d, 0);
   if (st >= 0) st = gather_side(ctx, d, 1);
@@ -277,19 +286,32 @@ static batten_plot_layer layer(batten_plot_kind kind, const lines *l, unsigned c
                              .label = label};
 }
 
+/* Several contours have two plots alone, which need not be higher than what they show. */
+static unsigned needed_height(const drawing *d, unsigned width) {
+  if (d->w->count == 1) return width / 16 * 11;
+  double aspect = d->box[0] > 0 ? d->box[1] / d->box[0] : 1;
+  return (unsigned)fmax(16, width * fmax(0.35, fmin(1, 0.46 * aspect + 0.11)));
+}
+
+/* In thousandths of the picture: crosses of neighbours hardly touch, where the curve takes half of the picture. */
+static double cross_radius(const drawing *d) {
+  double spacing = d->size > 0 ? 450 * d->length / d->size / (double)d->data.count : 0;
+  return fmax(1.6, fmin(has_surroundings(d) ? 4 : 2.2, 0.35 * spacing));
+}
+
 static void shape_plot(const drawing *d, int which, batten_plot_layer *layers, batten_plot *plot,
                        char caption[CAPTION]) {
   const side *s = &d->sides[which];
   const curve_work *w = d->w;
-  bool few = w->count == 1 && s->polygon.count <= 60;
+  bool few = w->count == 1 && s->polygon.count <= 60, named = which == 1, all = has_surroundings(d);
   layers[0] = layer(BATTEN_PLOT_LINE, &s->quills, 0xcfdbe9, 0.9, NULL);
-  layers[1] = layer(BATTEN_PLOT_LINE, &s->envelope, 0x8fabcb, 1.3, which ? "curvature" : NULL);
-  layers[2] = layer(BATTEN_PLOT_LINE, &s->polygon, 0xa0a0a0, 1.2, which ? "control polygon" : NULL);
-  layers[3] = layer(BATTEN_PLOT_DOTS, &s->polygon, 0x808080, few ? 3.2 : 1.8, NULL);
-  layers[4] = layer(BATTEN_PLOT_LINE, &s->curve, 0x1f4e79, 2.4, which ? "curve" : NULL);
-  layers[5] = layer(BATTEN_PLOT_CROSSES, &d->data, 0xc8442c, d->data.count <= 200 ? 4 : 0, which ? "data" : NULL);
+  layers[1] = layer(BATTEN_PLOT_LINE, &s->envelope, 0x8fabcb, 1.3, named && all ? "curvature" : NULL);
+  layers[2] = layer(BATTEN_PLOT_CROSSES, &d->data, 0xc8442c, cross_radius(d), named ? "data" : NULL);
+  layers[3] = layer(BATTEN_PLOT_LINE, &s->polygon, 0xa0a0a0, 1.2, named && all ? "control polygon" : NULL);
+  layers[4] = layer(BATTEN_PLOT_DOTS, &s->polygon, 0x808080, few ? 3.2 : 1.8, NULL);
+  layers[5] = layer(BATTEN_PLOT_LINE, &s->curve, 0x1f4e79, all ? 2.4 : 1.4, named ? "curve" : NULL);
   layers[6] = layer(BATTEN_PLOT_RINGS, &s->inflections, 0x1a7f37, w->count == 1 ? 7 : 4,
-                    which && s->inflections.count ? "inflection" : NULL);
+                    named && s->inflections.count ? "inflection" : NULL);
   double sum = 0;
   size_t inflections = 0;
   bool proven = true;
@@ -299,8 +321,8 @@ static void shape_plot(const drawing *d, int which, batten_plot_layer *layers, b
     inflections += which ? info->inflections_found : info->inflections_unconstrained;
     proven = proven && info->shape.certified;
   }
-  snprintf(caption, CAPTION, "%s: %zu inflection%s%s, sum of squares %.4g", which ? "with inequalities" : "without",
-           inflections, inflections == 1 ? "" : "s",
+  snprintf(caption, CAPTION, "%s: %zu inflection%s%s, sum of squares %.4g",
+           which ? "with inequalities" : "without inequalities", inflections, inflections == 1 ? "" : "s",
            !which   ? ""
            : proven ? " (proven)"
                     : " (NOT PROVEN)",
@@ -323,20 +345,32 @@ static batten_status band(batten_context *ctx, const curve_item *item, lines *ou
   return BATTEN_OK;
 }
 
+/* A bend far stronger than the others, as the nose of an airfoil is, would flatten the rest: the plot is cut, and its
+ * label tells what there is. */
 static void curvature_plot(const drawing *d, int which, const lines *smoothed, batten_plot_layer *layers,
-                           batten_plot *plot, const double zero[4]) {
+                           batten_plot *plot, const double zero[4], char label[CAPTION]) {
   const side *s = &d->sides[which];
   const batten_curve_measures *m = &d->w->items[0].measures;
+  double limit = 2.5 * fmax(d->bend, 0.02 * fmax(fabs(m->curvature_min), fabs(m->curvature_max)));
+  double low = fmax(-limit, fmin(0, m->curvature_min)), high = fmin(limit, fmax(0, m->curvature_max));
+  double margin = 0.25 * (high - low), lowest = INFINITY, highest = -INFINITY;
+  for (size_t i = 0; i < s->curvature.count; i++) {
+    lowest = fmin(lowest, s->curvature.points[2 * i + 1]);
+    highest = fmax(highest, s->curvature.points[2 * i + 1]);
+  }
+  if (lowest < low - margin || highest > high + margin)
+    snprintf(label, CAPTION, "curvature, cut (%.4g to %.4g)", lowest, highest);
+  else
+    snprintf(label, CAPTION, "curvature");
   layers[0] = layer(BATTEN_PLOT_AREA, smoothed, 0xe4e0d4, 0, which && smoothed->count ? "smoothed data" : NULL);
   layers[1] = (batten_plot_layer){.count = 2, .points = zero, .color = 0x6a6f78, .width = 1.2};
   layers[2] = layer(BATTEN_PLOT_LINE, &s->curvature, 0x1f4e79, 2.4, NULL);
-  double low = fmin(0, m->curvature_min), high = fmax(0, m->curvature_max), margin = 0.25 * (high - low);
   *plot = (batten_plot){.layer_count = CURVATURE_LAYERS,
                         .layers = layers,
                         .stretched = 1,
                         .lower = {0, low - margin},
                         .upper = {zero[2], high + margin},
-                        .labels = {"length", "curvature"}};
+                        .labels = {"length", label}};
 }
 
 batten_status curve_draw(const curve_work *w, const char *path) {
@@ -345,16 +379,18 @@ batten_status curve_draw(const curve_work *w, const char *path) {
   lines smoothed = {0};
   batten_plot_layer shapes[2][SHAPE_LAYERS], curvatures[2][CURVATURE_LAYERS];
   batten_plot plots[4] = {0};
-  char captions[2][CAPTION];
+  char captions[2][CAPTION], labels[2][CAPTION];
+  batten_picture_options options = w->request->picture;
   batten_status st = gather(ctx, &d);
   if (st >= 0 && w->count == 1) st = band(ctx, &w->items[0], &smoothed);
   if (st >= 0) {
     const double zero[4] = {0, 0, d.length, 0};
+    if (options.height == 0) options.height = needed_height(&d, options.width);
     for (int k = 0; k < 2; k++) {
       shape_plot(&d, k, shapes[k], &plots[k], captions[k]);
-      if (w->count == 1) curvature_plot(&d, k, &smoothed, curvatures[k], &plots[2 + k], zero);
+      if (w->count == 1) curvature_plot(&d, k, &smoothed, curvatures[k], &plots[2 + k], zero, labels[k]);
     }
-    st = batten_picture_plots(ctx, w->count == 1 ? 2 : 1, 2, plots, &w->request->picture, path);
+    st = batten_picture_plots(ctx, w->count == 1 ? 2 : 1, 2, plots, &options, path);
   }
   lines_free(ctx, &smoothed);
   lines_free(ctx, &d.data);

@@ -6,6 +6,7 @@
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "base/checked.h"
 
@@ -106,16 +107,41 @@ static batten_status make_range(batten_context *ctx, plot_view *v, size_t index)
   return BATTEN_OK;
 }
 
-static bool has_legend(const batten_plot *p) {
-  for (size_t i = 0; i < p->layer_count; i++)
-    if (p->layers[i].label) return true;
-  return false;
+/* Beside the frame, and the height of small lettering, in heights of lettering. */
+static const double LEFT = 5.2, RIGHT = 2.2, SMALL = 0.85;
+
+static double frame_width(const plot_view *v) { return fmax(1, v->x1 - v->x0 - (LEFT + RIGHT) * v->unit); }
+
+/* The legend is filled from the right, row by row upwards; the name of the upward axis has the left of the lowest. */
+typedef struct legend_place {
+  unsigned row;
+  double right; /* where the name ends, from the left of the frame; 0 before the first */
+  double width; /* of sample and name */
+} legend_place;
+
+static void legend_next(const plot_view *v, const char *label, legend_place *at) {
+  const char *axis = v->plot->labels[1];
+  double unit = v->unit, height = SMALL * unit, room = frame_width(v), gap = 1.4 * unit;
+  double taken = at->row == 0 && axis ? picture_text_width(height, axis) + gap : 0;
+  bool first = at->width == 0;
+  double right = first ? room : at->right - at->width - gap;
+  at->width = fmin(room, picture_text_width(height, label) + 2.5 * unit);
+  if (right - at->width < taken && !(first && taken == 0)) {
+    at->row++;
+    right = room;
+  }
+  at->right = right;
 }
 
 /* Above the frame, in heights of lettering: caption, then the legend on the right and the name of the upward
  * axis on the left. */
-static double top_room(const batten_plot *p) {
-  return 1.2 + (p->caption ? 1.8 : 0) + (has_legend(p) || p->labels[1] ? 1.5 : 0);
+static double top_room(const plot_view *v) {
+  const batten_plot *p = v->plot;
+  legend_place at = {0};
+  for (size_t i = p->layer_count; i-- > 0;)
+    if (p->layers[i].label) legend_next(v, p->layers[i].label, &at);
+  bool any = at.width > 0 || p->labels[1];
+  return 1.2 + (p->caption ? 1.8 : 0) + 1.5 * (at.row + any);
 }
 
 /* top: of the plot in its row that needs most, so that frames are in line. */
@@ -123,9 +149,9 @@ static void make_frame(plot_view *v, double top) {
   const batten_plot *p = v->plot;
   picture_frame *f = &v->frame;
   double size[2];
-  *f = (picture_frame){.x0 = v->x0 + 5.2 * v->unit,
+  *f = (picture_frame){.x0 = v->x0 + LEFT * v->unit,
                        .y0 = v->y0 + top * v->unit,
-                       .x1 = v->x1 - 2.2 * v->unit,
+                       .x1 = v->x1 - RIGHT * v->unit,
                        .y1 = v->y1 - (p->labels[0] ? 4.6 : 3.6) * v->unit};
   double room[2] = {fmax(1, f->x1 - f->x0), fmax(1, f->y1 - f->y0)};
   for (int k = 0; k < 2; k++) size[k] = v->upper[k] - v->lower[k];
@@ -171,7 +197,7 @@ static batten_status lay_out(batten_context *ctx, unsigned rows, unsigned column
   join_groups(count, views);
   for (size_t i = 0; i < count; i++) {
     double above = 0;
-    for (size_t k = i - i % columns; k < i - i % columns + columns; k++) above = fmax(above, top_room(&plots[k]));
+    for (size_t k = i - i % columns; k < i - i % columns + columns; k++) above = fmax(above, top_room(&views[k]));
     make_frame(&views[i], above);
   }
   return BATTEN_OK;
@@ -198,20 +224,20 @@ static void draw_axes(picture_sheet *s, const plot_view *v) {
     double x = frame_x(f, picture_tick_value(&ticks[0], i));
     sheet_line(s, x, f->y0, x, f->y1, 1, GRID);
     picture_tick_text(&ticks[0], i, text);
-    sheet_text(s, x, f->y1 + 1.9 * unit, 0.85 * unit, 1, INK, text);
+    sheet_text(s, x, f->y1 + 1.9 * unit, SMALL * unit, 1, INK, text);
   }
   for (size_t i = 0; i < ticks[1].count; i++) {
     double y = frame_y(f, picture_tick_value(&ticks[1], i));
     sheet_line(s, f->x0, y, f->x1, y, 1, GRID);
     picture_tick_text(&ticks[1], i, text);
-    sheet_text(s, f->x0 - 0.8 * unit, y + 0.42 * unit, 0.85 * unit, 2, INK, text);
+    sheet_text(s, f->x0 - 0.8 * unit, y + 0.42 * unit, SMALL * unit, 2, INK, text);
   }
   sheet_line(s, f->x0, f->y0, f->x1, f->y0, 1.2, FRAME);
   sheet_line(s, f->x0, f->y1, f->x1, f->y1, 1.2, FRAME);
   sheet_line(s, f->x0, f->y0, f->x0, f->y1, 1.2, FRAME);
   sheet_line(s, f->x1, f->y0, f->x1, f->y1, 1.2, FRAME);
-  if (v->plot->labels[0]) sheet_text(s, f->middle[0], f->y1 + 3.5 * unit, 0.85 * unit, 1, INK, v->plot->labels[0]);
-  if (v->plot->labels[1]) sheet_text(s, f->x0, f->y0 - 0.7 * unit, 0.85 * unit, 0, INK, v->plot->labels[1]);
+  if (v->plot->labels[0]) sheet_text(s, f->middle[0], f->y1 + 3.5 * unit, SMALL * unit, 1, INK, v->plot->labels[0]);
+  if (v->plot->labels[1]) sheet_text(s, f->x0, f->y0 - 0.7 * unit, SMALL * unit, 0, INK, v->plot->labels[1]);
 }
 
 static double line_width(const batten_plot_layer *l, double side) {
@@ -244,29 +270,48 @@ static void draw_layer(picture_sheet *s, const plot_view *v, const batten_plot_l
   }
 }
 
-/* Samples of the layers with a name, from the right end of the frame, right above it. */
+/* Text in a room: in smaller letters, and cut when those would be too small to read. */
+static void draw_text(picture_sheet *s, double x, double y, double height, double room, int anchor, unsigned color,
+                      const char *text) {
+  const double least = 6;
+  char shown[256];
+  double width = picture_text_width(height, text);
+  if (width > room) height = fmax(fmin(least, height), height * room / width);
+  snprintf(shown, sizeof shown, "%s", text);
+  for (size_t n = strlen(shown); n > 4 && picture_text_width(height, shown) > room * (1 + 1e-9); n--)
+    memcpy(shown + n - 4, "...", 4);
+  sheet_text(s, x, y, height, anchor, color, shown);
+}
+
+static void draw_sample(picture_sheet *s, const plot_view *v, const batten_plot_layer *l, double right, double middle,
+                        double side) {
+  double unit = v->unit, left = right - 1.8 * unit, place[2] = {0, 0};
+  if (l->kind == BATTEN_PLOT_LINE || l->kind == BATTEN_PLOT_AREA) {
+    double width = l->kind == BATTEN_PLOT_AREA ? SMALL * unit : line_width(l, side), cap = 0.5 * width;
+    sheet_line(s, left + cap, middle, right - cap, middle, width, l->color);
+    return;
+  }
+  batten_plot_layer one = *l;
+  one.width = 1e3 * mark_radius(l, v, side) / side; /* as in the plot */
+  one.count = 1;
+  one.points = place;
+  one.part_count = 0;
+  picture_frame f = {left, middle - unit, right, middle + unit, {0, 0}, {0.5 * (left + right), middle}, {1, 1}};
+  plot_view sample = {.unit = unit, .frame = f};
+  draw_layer(s, &sample, &one, side, NULL);
+}
+
+/* Samples of the layers with a name. */
 static void draw_legend(picture_sheet *s, const plot_view *v, double side) {
-  double right = v->frame.x1, unit = v->unit, height = 0.85 * unit, base = v->frame.y0 - 0.7 * unit;
+  legend_place at = {0};
+  double unit = v->unit, height = SMALL * unit;
   for (size_t i = v->plot->layer_count; i-- > 0;) {
     const batten_plot_layer *l = &v->plot->layers[i];
     if (!l->label) continue;
-    sheet_text(s, right, base, height, 2, INK, l->label);
-    right -= picture_text_width(height, l->label) + 0.7 * unit;
-    double middle = base - 0.5 * height, x[2] = {right - 1.8 * unit, right};
-    if (l->kind == BATTEN_PLOT_LINE || l->kind == BATTEN_PLOT_AREA) {
-      sheet_line(s, x[0], middle, x[1], middle, l->kind == BATTEN_PLOT_AREA ? height : line_width(l, side), l->color);
-    } else {
-      batten_plot_layer one = *l;
-      double place[2] = {0, 0};
-      one.width = 1e3 * mark_radius(l, v, side) / side; /* as in the plot */
-      picture_frame f = {x[0], middle - unit, x[1], middle + unit, {0, 0}, {0.5 * (x[0] + x[1]), middle}, {1, 1}};
-      plot_view sample = {.unit = unit, .frame = f};
-      one.count = 1;
-      one.points = place;
-      one.part_count = 0;
-      draw_layer(s, &sample, &one, side, NULL);
-    }
-    right = x[0] - 1.4 * unit;
+    legend_next(v, l->label, &at);
+    double base = v->frame.y0 - (0.7 + 1.5 * at.row) * unit, right = v->frame.x0 + at.right;
+    draw_text(s, right, base, height, at.width - 2.5 * unit, 2, INK, l->label);
+    draw_sample(s, v, l, right - at.width + 1.8 * unit, base - 0.5 * height, side);
   }
 }
 
@@ -274,7 +319,8 @@ static void draw_view(picture_sheet *s, const plot_view *v, double side, double 
   draw_axes(s, v);
   for (size_t i = 0; i < v->plot->layer_count; i++)
     if (v->plot->layers[i].count) draw_layer(s, v, &v->plot->layers[i], side, xy);
-  if (v->plot->caption) sheet_text(s, v->frame.x0, v->y0 + 1.7 * v->unit, 0.95 * v->unit, 0, TITLE, v->plot->caption);
+  if (v->plot->caption)
+    draw_text(s, v->frame.x0, v->y0 + 1.7 * v->unit, 0.95 * v->unit, frame_width(v), 0, TITLE, v->plot->caption);
   draw_legend(s, v, side);
 }
 
@@ -286,7 +332,8 @@ static batten_status draw_all(batten_context *ctx, picture_sheet *s, size_t coun
     batten_status st = batten_progress(ctx, "picture", 0.9 * (double)(i + 1) / (double)count);
     if (st < 0) return st;
   }
-  if (o->title) sheet_text(s, views[0].frame.x0, 2.8 * unit, 1.25 * unit, 0, TITLE, o->title);
+  double left = views[0].frame.x0;
+  if (o->title) draw_text(s, left, 2.8 * unit, 1.25 * unit, o->width - left - unit, 0, TITLE, o->title);
   return BATTEN_OK;
 }
 

@@ -162,6 +162,18 @@ for file in $report stack.report.json; do
 done
 run 0 "" curve wave.txt --quiet --picture wave.svg --size 800,600 --title "A wave"
 check "the picture in SVG has its title" grep -q '>A wave</text>' wave.svg
+awk 'BEGIN { print "NACA 0012"; print "41. 41."
+  for (side = 1; side >= -1; side -= 2) { print ""; for (i = 0; i <= 40; i++) { x = (1 - cos(i * 3.14159265 / 40)) / 2
+    print x, side * 0.6 * (0.2969 * sqrt(x) - 0.126 * x - 0.3516 * x ^ 2 + 0.2843 * x ^ 3 - 0.1036 * x ^ 4) } } }' >naca.dat
+run 0 "" curve naca.dat --quiet --picture naca.svg --report naca.json
+is naca.json points 81
+check "a nose does not flatten the plot of curvature" grep -Eq '>curvature, cut \([0-9.]+ to [0-9.]+\)<' naca.svg
+check "nor is a plot cut where that hides little" grep -q '>curvature</text>' wave.svg
+run 0 "" curve stack.txt --quiet --closed --picture stack.svg
+check "a few contours have combs" grep -q '>control polygon<' stack.svg
+for k in 1 2 3; do awk -v k=$k '/^contour/ { print; next } { print k, k * $2, k * $3 }' stack.txt; done >tall.txt
+run 0 "" curve tall.txt --quiet --closed --picture tall.svg
+check "many have curves and data alone" sh -c "grep -q '>curve<' tall.svg && ! grep -q '>control polygon<' tall.svg"
 run 0 "" curve wave.txt --quiet --threads 1 -o one.json
 run 0 "" curve wave.txt --quiet --threads 4 -o four.json
 check "one thread or four" cmp one.json four.json

@@ -120,6 +120,49 @@ static void test_panels(batten_context *ctx) {
   free(p.rgb);
 }
 
+/* What is not white between two columns. */
+static size_t inked(const pixels *p, size_t from_x, size_t to_x) {
+  size_t count = 0;
+  for (size_t y = 0; y < p->height; y++)
+    for (size_t x = from_x; x < to_x; x++) count += p->rgb[3 * (y * p->width + x)] < 250;
+  return count;
+}
+
+/* Captions and legends that are longer than the frame is wide stay above it. */
+static void test_narrow(batten_context *ctx) {
+  static char text[1 << 16];
+  static const char *const names[] = {"curvature", "data", "control polygon", "curve", "inflection"};
+  batten_plot_layer layers[5];
+  for (size_t i = 0; i < 5; i++)
+    layers[i] = (batten_plot_layer){.count = 4, .points = SQUARE, .closed = 1, .label = names[i]};
+  batten_plot plots[2] = {{0},
+                          {.layer_count = 5,
+                           .layers = layers,
+                           .caption = "a caption that is much longer than what there is room for in the frame below",
+                           .labels = {NULL, "curvature, cut"}}};
+  batten_picture_options o = small(300, 400);
+  T_OK(batten_picture_plots(ctx, 1, 2, plots, &o, png), ctx);
+  pixels p = read_png(png);
+  T_CHECK(inked(&p, 0, 150) == 0 && inked(&p, 292, 300) == 0 && inked(&p, 150, 292) > 1000,
+          "nothing beyond the plot: %zu pixels before it, %zu behind it", inked(&p, 0, 150), inked(&p, 292, 300));
+  free(p.rgb);
+  T_OK(batten_picture_plots(ctx, 1, 2, plots, &o, svg), ctx);
+  FILE *f = fopen(svg, "r");
+  if (f) text[fread(text, 1, sizeof text - 1, f)] = '\0';
+  if (f) fclose(f);
+  T_CHECK(strstr(text, ">a caption") && strstr(text, "...</text>"), "a caption that is cut says so");
+  double y[5] = {0};
+  for (size_t i = 0; i < 5; i++) {
+    char name[64];
+    snprintf(name, sizeof name, ">%s</text>", names[i]);
+    const char *at = strstr(text, name);
+    while (at && at > text && strncmp(at, " y=\"", 4)) at--;
+    if (at) y[i] = atof(at + 4);
+  }
+  T_CHECK(y[0] > 0 && y[0] < y[2] && y[2] <= y[4] && y[4] < 100, "names of the legend in rows: %g %g %g %g %g", y[0],
+          y[1], y[2], y[3], y[4]);
+}
+
 static batten_status draw(batten_context *ctx, void *path) {
   const double dots[] = {1, 1, 3, 1};
   batten_picture_options o = small(300, 200);
@@ -191,6 +234,7 @@ int main(void) {
   test_scales(ctx);
   test_frames(ctx);
   test_panels(ctx);
+  test_narrow(ctx);
   test_svg(ctx);
   T_OK(draw(ctx, png), ctx);
   T_OK(draw(ctx, other), ctx);
