@@ -104,7 +104,7 @@ static unsigned least_degree(const contour_shape *shape, const contour_ends *end
 static const char *why_none(const reference_task *task, unsigned construction) {
   if (construction == 2) return "knot removal does not find one; allow construction 1";
   if (ends_fixed(task->ends))
-    return "the fixed ends contradict the signs of curvature; free them, or change the inflections";
+    return "the fixed ends contradict the signs of curvature, or leave no room; free them, or change the inflections";
   return "runs between inflections turn too far for their number of spans; give more knots, or raise opt.depth_max";
 }
 

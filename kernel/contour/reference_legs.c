@@ -26,14 +26,15 @@ static const double smoothing_first = 1e-10, smoothing_most = 1e-2, smoothing_fa
 /* A leg is at least this part of the mean one. */
 static const double length_least = 0.02;
 
-/* What is tried in turn. */
+/* What is tried in turn. The last two are for fixed ends that only a curve with nearly all of its turn at one of them
+ * can join. */
 typedef struct attempt {
   double turn_most;  /* of neighbours, in units of turn_unit */
   double turn_least; /* of a run, as a part of what the smoothed curve has there; and at least this, radians */
   double ratio;      /* lengths of neighbours differ at most by this times their turn */
 } attempt;
-static const attempt attempts[] = {{1.5, 0.05, 3}, {0.9, 0.05, 3},   {1.5, 0.1, 1},
-                                   {0.9, 0.1, 1},  {1.5, 0.2, 0.25}, {0.9, 0.2, 0.25}};
+static const attempt attempts[] = {{1.5, 0.05, 3},   {0.9, 0.05, 3},   {1.5, 0.1, 1},  {0.9, 0.1, 1},
+                                   {1.5, 0.2, 0.25}, {0.9, 0.2, 0.25}, {1.5, 0.2, 12}, {1.5, 0.2, 60}};
 
 /* A degree higher gives more legs. That is tried when neighbours turn by more than so many right angles (smoothness
  * 1: 1.2 of them), for their turn is limited. */

@@ -326,33 +326,55 @@ static void test_ends(batten_context *ctx) {
     }
     trial_free(ctx, &t);
   }
-  /* From (0, 0) to (1, 0), starting downwards, with a left turn only: fine; a right turn would have to go round. */
-  contour_rule arc = {.kind = CONTOUR_SINE, .count = 20};
-  trial t = trial_make(&arc, 3, 2, 4, 0);
-  contour_ends ends = {{{0, 0}, {1, 0}}, {{sqrt(0.5), -sqrt(0.5)}, {sqrt(0.5), sqrt(0.5)}}};
-  for (size_t i = 0; i < arc.count; i++) {
+}
+
+/* Points of an arc below the chord from (0, 0) to (1, 0), which turns left. */
+static trial make_arc(unsigned degree, unsigned smoothness, size_t spans) {
+  trial t = trial_make(&(contour_rule){.kind = CONTOUR_SINE, .count = 20}, degree, smoothness, spans, 0);
+  for (size_t i = 0; i < t.data.count; i++) {
     double x = t.parameters[i];
     t.scene.points[2 * i] = x;
     t.scene.points[2 * i + 1] = -x * (1 - x);
   }
+  memset(t.signs, 1, t.shape.spans);
+  return t;
+}
+
+/* The ends of that chord, with tangents that make these angles with it, degrees. */
+static contour_ends chord(double first, double last) {
+  double a = first * SCENE_PI / 180, b = last * SCENE_PI / 180;
+  return (contour_ends){{{0, 0}, {1, 0}}, {{cos(a), -sin(a)}, {cos(b), sin(b)}}};
+}
+
+static void test_tangents(batten_context *ctx) {
+  contour_ends ends = chord(45, 45);
+  trial t = make_arc(3, 2, 4);
   t.ends = &ends;
   T_OK(trial_run(ctx, &t), ctx);
   T_CHECK(right_signs(&t), "an arc between fixed ends");
-  for (size_t i = 0; i < t.shape.spans; i++) t.signs[i] = -1;
+  for (size_t i = 0; i < t.shape.spans; i++) t.signs[i] = -1; /* that would have to go round */
   T_STATUS(trial_run(ctx, &t), BATTEN_E_INFEASIBLE, ctx, "the fixed ends contradict the signs");
   trial_free(ctx, &t);
   /* One piece and both tangents: a parabola has no length of legs to choose, but a cubic has. */
-  t = trial_make(&arc, 3, 1, 1, 0);
-  for (size_t i = 0; i < t.data.count; i++)
-    for (int c = 0; c < 2; c++)
-      t.scene.points[2 * i + (size_t)c] = c ? -t.parameters[i] * (1 - t.parameters[i]) : t.parameters[i];
-  t.signs[0] = 1;
+  t = make_arc(3, 1, 1);
   t.ends = &ends;
   for (t.construction = 0; t.construction <= 2; t.construction++) {
     T_OK(trial_run(ctx, &t), ctx);
-    T_CHECK(right_signs(&t), "an arc of one piece between fixed ends, construction %u", t.construction);
+    T_CHECK(right_signs(&t), "one piece between fixed ends, construction %u", t.construction);
   }
   trial_free(ctx, &t);
+  /* Tangents that differ much: legs on one side are many times as long as those on the other. */
+  for (unsigned smoothness = 1; smoothness <= 2; smoothness++)
+    for (int slope = 10; slope <= 80; slope += 10)
+      for (int flat = 0; flat < 2; flat++) {
+        ends = flat ? chord(2.5, slope) : chord(slope, 2.5);
+        t = make_arc(4, smoothness, 5);
+        t.ends = &ends;
+        t.construction = 1;
+        T_OK(trial_run(ctx, &t), ctx);
+        T_CHECK(right_signs(&t), "smoothness %u, %d degrees at one end, 2.5 at the other", smoothness, slope);
+        trial_free(ctx, &t);
+      }
 }
 
 /* Inflections at neighbouring breaks: straight for cubics, but not for degree 4. */
@@ -527,6 +549,7 @@ int main(void) {
   test_random(ctx);
   test_spirals(ctx);
   test_ends(ctx);
+  test_tangents(ctx);
   test_neighbours(ctx);
   test_strict(ctx);
   test_bad_data(ctx);
