@@ -52,7 +52,7 @@ static const cli_option table[] = {
     {"degree", OPT_DEGREE, "D", "smoothness + 1 to 9; default 3"},
     {"smooth", OPT_SMOOTH, "L", "continuous derivatives, 1 or 2; default 2"},
     {"closed", OPT_CLOSED, NULL, "smooth closed curves; the first point may be there again at the end"},
-    {"contour", OPT_CONTOUR, "N", "only this one of the file, counted from 1"},
+    {"contour", OPT_CONTOUR, "N", "only this one of the file, counted from 0"},
     {"inflections", OPT_INFLECTIONS, "LIST",
      "auto (those that the data speak for), none, parameters T1,T2,... or a FILE: numbers,\n"
      "or an edited --proposal; default auto"},
@@ -81,7 +81,7 @@ static const cli_option table[] = {
      "of the reference: 1 (directions of legs), 2 (removal of knots); default: the nearer of both"},
     {"unit", OPT_UNIT, "NAME", "of lengths in STEP and IGES: mm, cm, m or inch; default mm"},
     {"deviation", OPT_DEVIATION, "T", "of polylines and points from the curve; default 1e-4 of its size"},
-    {"size", CLI_KEY_SIZE, "W,H", "picture's size in pixels; default 1600,1100, of several contours by their box"},
+    {"size", CLI_KEY_SIZE, "W,H", "picture's size in pixels; default 1600 wide and as high as it needs"},
     CLI_OPTION_TITLE,
     CLI_OPTION_MEMORY,
     CLI_OPTION_THREADS,
@@ -128,7 +128,8 @@ static bool take_fitted(curve_request *q, int key, const char *v) {
       q->options.closed = 1;
       return true;
     default:
-      return cli_parse_count("--contour", v, 1, SIZE_MAX, &q->contour);
+      q->alone = true;
+      return cli_parse_count("--contour", v, 0, SIZE_MAX, &q->contour);
   }
 }
 
@@ -176,6 +177,13 @@ static bool take_knots(curve_request *q, const char *v) {
   return true;
 }
 
+static bool take_direction(const char *option, const char *v, double out[2]) {
+  if (!cli_parse_numbers(option, v, 2, out)) return false;
+  bool any = out[0] < 0 || out[0] > 0 || out[1] < 0 || out[1] > 0;
+  if (!any) cli_error("%s: '%s' is no direction", option, v);
+  return any;
+}
+
 static bool take_wanted(curve_request *q, int key, const char *v) {
   static const char *const sides[] = {"auto", "left", "right", NULL}, *const ends[] = {"free", "fixed", NULL};
   batten_contour_options *o = &q->options;
@@ -202,9 +210,9 @@ static bool take_wanted(curve_request *q, int key, const char *v) {
       o->fix_ends[0] = o->fix_ends[1] = word;
       return true;
     case OPT_START_TANGENT:
-      return cli_parse_numbers("--start-tangent", v, 2, o->end_tangents[0]);
+      return take_direction("--start-tangent", v, o->end_tangents[0]);
     default:
-      return cli_parse_numbers("--end-tangent", v, 2, o->end_tangents[1]);
+      return take_direction("--end-tangent", v, o->end_tangents[1]);
   }
 }
 
@@ -266,7 +274,7 @@ static batten_status take_contour(curve_work *w, size_t i, size_t k) {
   const batten_contours *c = &w->contours;
   curve_item *item = &w->items[k];
   size_t first = c->starts[i];
-  *item = (curve_item){.number = i + 1, .count = c->starts[i + 1] - first, .points = c->points + 2 * first};
+  *item = (curve_item){.number = i, .count = c->starts[i + 1] - first, .points = c->points + 2 * first};
   item->options = q->options;
   if (c->weights) item->options.weights = c->weights + first;
   if (c->parameters && !q->own_parameters) item->options.parameters = c->parameters + first;
@@ -288,9 +296,9 @@ static batten_status take_contour(curve_work *w, size_t i, size_t k) {
 static batten_status take_contours(curve_work *w) {
   const curve_request *q = w->request;
   batten_context *ctx = w->run.ctx;
-  size_t all = w->contours.count, wanted = q->contour ? 1 : all;
-  if (q->contour > all)
-    return batten_fail(ctx, BATTEN_E_INVALID, "--contour: %zu; the file has %zu", q->contour, all);
+  size_t all = w->contours.count, wanted = q->alone ? 1 : all;
+  if (q->alone && q->contour >= all)
+    return batten_fail(ctx, BATTEN_E_INVALID, "--contour: %zu; the last of the file is %zu", q->contour, all - 1);
   if (q->file_parameters && !w->contours.parameters)
     return batten_fail(ctx, BATTEN_E_INVALID,
                        "points: no column t in the file; name it in its first line, or leave --parameters");
@@ -300,7 +308,7 @@ static batten_status take_contours(curve_work *w) {
   for (size_t k = 0; k < wanted; k++) {
     w->items[k] = (curve_item){0};
     w->count++;
-    batten_status st = take_contour(w, q->contour ? q->contour - 1 : k, k);
+    batten_status st = take_contour(w, q->alone ? q->contour : k, k);
     if (st < 0) return st;
   }
   return BATTEN_OK;

@@ -25,12 +25,13 @@ typedef struct curve_request {
   const char *knots_file;  /* --knots FILE; NULL = none */
   bool file_parameters;    /* those of the file are wanted */
   bool own_parameters;     /* they are to be estimated though the file has some */
-  size_t contour;          /* the only one, counted from 1; 0 = all */
+  bool alone;              /* one contour of the file is wanted */
+  size_t contour;          /* which, from 0 */
 } curve_request;
 
 /* One contour of the input and what became of it. */
 typedef struct curve_item {
-  size_t number; /* in the file, from 1 */
+  size_t number; /* in the file, from 0 */
   size_t count;
   const double *points; /* [count][2] */
   batten_contour_options options;

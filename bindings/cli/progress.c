@@ -70,6 +70,7 @@ bool cli_run_open(cli_run *run, unsigned threads, size_t memory_limit, bool quie
   sigemptyset(&action.sa_mask);
   sigaction(SIGINT, &action, NULL);
   sigaction(SIGTERM, &action, NULL);
+  signal(SIGXFSZ, SIG_IGN); /* a file beyond the limit is an error of writing, after which what there is of it goes */
   return true;
 }
 

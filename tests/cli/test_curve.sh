@@ -43,13 +43,14 @@ run 2 "--sign: 'up' is not one of auto, left, right" curve wave.txt --sign up
 run 2 "--ends: 'fix' is not one of free, fixed" curve wave.txt --ends fix
 run 2 "--inflections: '0.2,,0.4' is not 3 numbers parted by commas" curve wave.txt --inflections 0.2,,0.4
 run 2 "--start-tangent: '1' is not 2 numbers" curve wave.txt --start-tangent 1
+run 2 "--start-tangent: '0,-0' is no direction" curve wave.txt --start-tangent 0,-0
 run 2 "x.ply: unknown extension for -o; use .json .step .iges .svg" curve wave.txt -o x.ply
 run 2 "x.jpg: unknown extension for --picture; use .png or .svg" curve wave.txt --picture x.jpg
 run 2 "./x.svg: is named as output twice" curve wave.txt -o x.svg --picture ./x.svg
 run 1 "none.txt" curve none.txt -o x.json
 run 1 "wishes.txt: cannot be read" curve wave.txt --inflections wishes.txt
 run 1 "knots.txt: cannot be read" curve wave.txt --knots knots.txt
-run 1 "--contour: 2; the file has 1" curve wave.txt --contour 2
+run 1 "--contour: 1; the last of the file is 0" curve wave.txt --contour 1
 run 1 "wave.txt: points: no column t in the file" curve wave.txt --parameters file
 run 1 "batten: --degree: 2" curve wave.txt --degree 2 --smooth 2
 printf '0.4\n0.2\n' >back.txt
@@ -144,8 +145,12 @@ is stack.report.json points 150
 is stack.report.json certified True
 is stack.report.json inflections_found 0
 is stack.report.json contour_certified "[1, 1, 1]"
-run 0 "" curve stack.txt --quiet --closed --contour 2 --report one.json
-is one.json contour "[2]"
+run 0 "" curve stack.txt --quiet --closed --contour 1 --report one.json
+is one.json contour "[1]"
+printf '0 0\n1 1\n2 0\n\n0 0\n1 0\n2 0\n\n0 0\n1 2\n2 0\n' >straight.txt
+run 1 "straight.txt: contour 1: points: all 3 are one point or lie on a line" curve straight.txt -o straight.json
+check "nothing is written when one contour of several fails" test ! -e straight.json
+run 0 "" curve straight.txt --quiet --contour 2 -o straight.json
 is one.json lsq "$(python3 -c 'import json; print(json.load(open("stack.report.json"))["contour_lsq"][1])')"
 run 0 "" inspect stack.json --report i.json
 is i.json kind curves
@@ -177,6 +182,10 @@ check "many have curves and data alone" sh -c "grep -q '>curve<' tall.svg && ! g
 run 0 "" curve wave.txt --quiet --threads 1 -o one.json
 run 0 "" curve wave.txt --quiet --threads 4 -o four.json
 check "one thread or four" cmp one.json four.json
+ls -A >before
+(ulimit -f 1; "$batten" curve wave.txt --quiet --deviation 1e-7 -o beyond.csv >out 2>err)
+ok $(($? != 1)) "a file beyond the limit of sizes: $(cat err)"
+check "leaves nothing behind" sh -c 'ls -A | diff before -'
 
 echo "1..$count"
 exit $bad
