@@ -292,6 +292,103 @@ static void test_ends(batten_context *ctx) {
   T_CHECK(refused == 0, "graphs t^2 (3 at - t) without a sign: %zu refused", refused);
 }
 
+/* The graph x = t, y'' = sum_i c_i s^i with s = t + from, t in [0, to - from], of degree 5: [x', x''] is y''. */
+static curve_case graph_case(const double c[4], double from, double to) {
+  curve_case out = {.degree = 5, .knot_count = 12};
+  double h = to - from, moved[4] = {0}, power[6] = {0};
+  for (int i = 0; i <= 3; i++) /* by parts of the span */
+    for (int k = 0, choose = 1; k <= i; choose = choose * (i - k) / (k + 1), k++)
+      moved[k] += c[i] * choose * pow(from, i - k) * pow(h, k);
+  for (int k = 0; k <= 3; k++) power[k + 2] = moved[k] * h * h / ((k + 1) * (k + 2));
+  for (int j = 0; j <= 5; j++) {
+    out.knots[6 + j] = h;
+    out.control[j][0] = h * j / 5;
+    double share = 1;
+    for (int k = 0; k <= j; share = share * (j - k) / (5 - k), k++) out.control[j][1] += share * power[k];
+  }
+  return out;
+}
+
+/* Where slack lets the zero be elsewhere, it still must be the only one, and near. */
+static void test_slack(batten_context *ctx) {
+  static const struct {
+    double c[4];
+    int certified;
+    const char *what;
+  } cases[] = {{{-0.1, 1, 0, 0}, 1, "one inflection, a tenth away"},
+               {{-0.3, 1, 0, 0}, 0, "one inflection, too far away"},
+               /* -0.02 + s ((s - 0.6)^2 + 0.01) is negative again near 0.6. */
+               {{-0.02, 0.37, -1.2, 1}, 0, "a dip behind the inflection"},
+               /* (s - 0.1) (s - 0.11) (s - 0.12) */
+               {{-0.00132, 0.0362, -0.33, 1}, 0, "three inflections in the place of one"}};
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    curve_case c = graph_case(cases[i].c, -0.5, 1);
+    batten_curve *curve = curve_case_make(ctx, &c);
+    batten_curve_shape_options o = batten_curve_shape_options_default();
+    batten_curve_shape shape = {.certified = -1};
+    double at = 0.5;
+    o.slack = 2;
+    o.inflection_count = 1;
+    o.inflections = &at;
+    T_OK(batten_curve_certify(ctx, curve, &o, &shape), ctx);
+    T_CHECK(shape.certified == cases[i].certified, "%s: certified %d", cases[i].what, shape.certified);
+    if (shape.certified)
+      T_CHECK(shape.inflection_error >= 0.1 && shape.inflection_error < 0.25, "it is within %.4g",
+              shape.inflection_error);
+    batten_curve_free(curve);
+  }
+}
+
+/* An inflection at its end of a closed curve, where it has a corner to the other side: of degree 2, which bends to
+ * where its polygon turns. */
+static void test_closed_corner(batten_context *ctx) {
+  curve_case c = {.degree = 2,
+                  .knot_count = 11,
+                  .knots = {0, 0, 0, 0.25, 0.5, 0.6, 0.7, 0.8, 1, 1, 1},
+                  .control = {{0, 0}, {2, 0}, {3, 2}, {3, 4}, {5, 5}, {7, 2}, {4, 0.5}, {0, 0}},
+                  .closed = 1};
+  double at[2] = {0, 0.5}, late[2] = {0.5, 1 - 0x1p-33};
+  for (int k = 0; k < 2; k++) {
+    c.control[6][1] = k ? 0.5 : -0.5; /* the corner turns to the left, and to the right */
+    batten_curve_shape shape = certify(ctx, &c, 0, 2, at);
+    T_CHECK(shape.certified && shape.sign == 1, "a closed curve with an inflection at its corner");
+    shape = certify(ctx, &c, 0, 2, late);
+    T_CHECK(shape.certified && shape.inflection_error >= 0x1p-33 && shape.inflection_error < 0x1.1p-33,
+            "wanted a little before it: %.3g", shape.inflection_error);
+  }
+}
+
+/* Two inflections that are wanted where there is one, at a knot; and a curvature that ends with the wrong sign at a
+ * knot where it jumps, beyond rounding and below. */
+static void test_at_knots(batten_context *ctx) {
+  curve_case c = {.degree = 3, .knot_count = 9, .knots = {0, 0, 0, 0, 0.5, 1, 1, 1, 1}};
+  static const double waves[] = {0, 0, 0.5, 1, 1}; /* y'' = 12 (1 - 2 t) */
+  for (int j = 0; j < 5; j++) {
+    c.control[j][0] = (c.knots[j + 1] + c.knots[j + 2] + c.knots[j + 3]) / 3;
+    c.control[j][1] = waves[j];
+  }
+  double at[2] = {0.5, 0.5 + 1e-11};
+  T_CHECK(certify(ctx, &c, 1, 1, at).certified, "a wave");
+  T_CHECK(!certify(ctx, &c, 1, 2, at).certified, "with its inflection twice");
+  static const double wrong[] = {0, 1e-15, 1e-12, 1e-9};
+  for (int i = 0; i < 4; i++) {
+    /* x = t, y'' from 1 to -e on [0, 1], then -1 to 2. */
+    double e = wrong[i], slope = (1 - e) / 2, value = 0.5 - (1 + e) / 6;
+    curve_case jump = {.degree = 3,
+                       .knot_count = 10,
+                       .knots = {0, 0, 0, 0, 1, 1, 2, 2, 2, 2},
+                       .control = {{0, 0},
+                                   {1 / 3.0, 0},
+                                   {2 / 3.0, value - slope / 3},
+                                   {4 / 3.0, value + slope / 3},
+                                   {5 / 3.0, value + 2 * slope / 3 - 1 / 6.0},
+                                   {2, value + slope - 0.5}}};
+    double knot = 1;
+    batten_curve_shape shape = certify(ctx, &jump, 1, 1, &knot);
+    T_CHECK(shape.certified == (e < 1e-14), "the wrong sign by %g: certified %d", e, shape.certified);
+  }
+}
+
 int main(void) {
   batten_context *ctx = t_context(NULL, NULL, 1);
   test_convex(ctx);
@@ -299,6 +396,9 @@ int main(void) {
   test_sharpness(ctx);
   test_edges(ctx);
   test_ends(ctx);
+  test_slack(ctx);
+  test_closed_corner(ctx);
+  test_at_knots(ctx);
   test_units(ctx);
   test_bad(ctx);
   batten_context_free(ctx);
