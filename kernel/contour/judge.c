@@ -5,6 +5,12 @@
  * point moves along the curve: each point is one number, and half of the unknowns, which are coordinates, shape the
  * curve across itself.
  *
+ * Few points tell little of noise, and three times what they tell may be a shape that is far off. So a misfit of less
+ * counts, too, where it is seen and no chance: inequalities that the true curve satisfies lower the freedom of the
+ * fit by less than its unknowns; what squares rise by them, over what noise gives so many unknowns, is then below an
+ * F distribution's, which its cube root makes normal [Paulson 1942]. Of many points that would find fault with what
+ * parameters that are not quite right leave; therefore the misfit that it takes at least.
+ *
  * Where the data contradict the shape most: the stretch of neighbours with the largest sum of what the squares of
  * their distances rise above a few times those of the fit without inequalities. */
 #include "contour_inner.h"
@@ -13,11 +19,14 @@
 
 /* As BATTEN_W_SHAPE has it. */
 static const double MISFIT = 3;
-/* Of the points' size: nothing that is so even to the eye contradicts a shape. */
-static const double EVEN = 1e-4;
+/* Of the points' size: nothing that is so even to the eye contradicts a shape; and what is plainly seen. */
+static const double EVEN = 1e-4, SEEN = 3e-3;
+/* A misfit of this much counts where it is seen, and chance gives it about once in 1,000 times: standard deviations
+ * of a normal variable. */
+static const double MISFIT_SURE = 2, CHANCE = 3;
 /* Fewer parts of the points' number than this that are left tell little of noise. */
 static const double FREEDOM_PART = 0.2;
-enum { FREEDOM_MIN = 4, DIFFERENCE_MIN = 4 };
+enum { FREEDOM_MIN = 4, DIFFERENCE_MIN = 4, ORDER_MIN = 3, ORDER_MAX = 6 };
 
 static double weight_of(const contour_data *data, size_t i) { return data->weights ? data->weights[i] : 1; }
 
@@ -34,23 +43,29 @@ static double size_of(const contour_data *data) {
   return size;
 }
 
-/* Third differences of neighbours vanish on smooth dense data; of noise s their mean square is 20 s^2. */
+/* Differences of neighbours vanish on smooth dense data, those of higher order sooner; of noise s the mean square of
+ * the k-th is C(2 k, k) s^2. The order that tells least is taken. */
 static double noise_of_differences(const contour_data *data) {
-  static const double factors[4] = {-1, 3, -3, 1};
-  double sum = 0;
-  size_t used = 0;
-  for (size_t i = 0; i + 3 < data->count; i++) {
-    bool counts = true;
-    for (size_t k = 0; k < 4; k++) counts = counts && weight_of(data, i + k) > 0;
-    if (!counts) continue;
-    for (size_t d = 0; d < 2; d++) {
-      double difference = 0;
-      for (size_t k = 0; k < 4; k++) difference += factors[k] * data->points[2 * (i + k) + d];
-      sum += difference * difference;
+  double least = INFINITY, factors[ORDER_MAX + 1] = {1}, norm = 1;
+  for (size_t order = 1; order <= ORDER_MAX; order++) {
+    for (size_t k = order; k > 0; k--) factors[k] -= factors[k - 1];
+    norm *= 4 - 2 / (double)order; /* C(2 k, k) */
+    double sum = 0;
+    size_t used = 0;
+    for (size_t i = 0; i + order < data->count && order >= ORDER_MIN; i++) {
+      double difference[2] = {0, 0};
+      bool counts = true;
+      for (size_t k = 0; k <= order; k++) {
+        counts = counts && weight_of(data, i + k) > 0;
+        for (size_t d = 0; d < 2; d++) difference[d] += factors[k] * data->points[2 * (i + k) + d];
+      }
+      if (!counts) continue;
+      sum += difference[0] * difference[0] + difference[1] * difference[1];
+      used++;
     }
-    used++;
+    if (used >= DIFFERENCE_MIN) least = fmin(least, sqrt(sum / (2 * norm * (double)used)));
   }
-  return used >= DIFFERENCE_MIN ? sqrt(sum / (40 * (double)used)) : NAN;
+  return isinf(least) ? NAN : least;
 }
 
 /* The stretch with the greatest sum of squares above `allowed` times the others, and above `least` [Kadane]. */
@@ -76,6 +91,16 @@ static void find_worst(const contour_data *data, const double *squares, const do
   out->distance = mean / (double)(to - from + 1);
 }
 
+/* Whether squares whose mean is `result` rise above those without inequalities, of mean `free` that leaves `left` of
+ * `count` points, by what is seen and no chance. */
+static bool surely_above(double result, double free, double count, double left, double size) {
+  double bound = count - left, noise = fmax(free * count / left, EVEN * EVEN * size * size);
+  if (left < 1 || bound <= 0 || result < MISFIT_SURE * MISFIT_SURE * noise) return false;
+  if (result - free < SEEN * SEEN * size * size) return false;
+  double root = cbrt((result - free) * count / bound / noise), a = 2 / (9 * bound), b = 2 / (9 * left);
+  return (1 - b) * root - (1 - a) > CHANCE * sqrt(a + b * root * root);
+}
+
 void contour_judge(const contour_data *data, const double *squares, const double *unconstrained_squares,
                    size_t unknowns, contour_verdict *out) {
   double total = 0, result = 0, free = 0, count = 0;
@@ -96,5 +121,5 @@ void contour_judge(const contour_data *data, const double *squares, const double
   find_worst(data, squares, unconstrained_squares, MISFIT, fmax(scale, EVEN * EVEN * size * size), out);
   if (isnan(noise)) return;
   out->misfit = rms / fmax(noise, EVEN * size);
-  out->contradicts = out->misfit > MISFIT;
+  out->contradicts = out->misfit > MISFIT || surely_above(result / total, free / total, count, left, size);
 }

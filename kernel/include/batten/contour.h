@@ -128,7 +128,9 @@ typedef struct batten_contour_info {
  * Progress phases: "parameters", "inflections", "knots", "reference", "quadratic program", "fit", "certify".
  * BATTEN_OK          fitted, and proven to have exactly the wanted shape (info->shape.certified)
  * BATTEN_W_SHAPE     proven, but the data have another shape: they are three times as far from the curve as their
- *                    noise explains. The text says where and by how much.
+ *                    noise explains (misfit); or twice, where that is seen (0.3 % of the points' size above the fit
+ *                    without inequalities) and chance would give it about once in 1,000 times. The text says where and by
+ *                    how much.
  * BATTEN_W_ACCURACY  not proven; the text says where
  * Same bits for any number of threads, and for points scaled by a power of two. Cost: O(count + spans) a round.
  * Fails: INVALID (points or weights that are not finite, all points equal or on one line, parameters out of order,
