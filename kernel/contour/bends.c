@@ -26,6 +26,8 @@ static const double NOISE_ALONE = 1;
 /* Between two inflections, and beyond the last one, lie so many points, or nothing speaks for a run. */
 enum { POINTS_MIN = 2 };
 enum { BISECTIONS = 40, PLACES = 64 };
+/* Groups on either side of one that is turned, whose signs are kept. */
+enum { NEIGHBOURS = 2 };
 
 /* Runs that are joined: a part of a ring or chain of all that are left. */
 typedef struct group {
@@ -253,28 +255,30 @@ static void set_ways(search *s, double from, double to, int way) {
   }
 }
 
-/* The least sum with the groups' signs, without group `without`. */
-static double cost(search *s, size_t without) {
+/* The least sum with the signs of group i and its neighbours, and (turned) with that of group i turned round. What is
+ * further away bends as it likes: it does not matter, and what is not asked is found in few steps. */
+static double cost(search *s, size_t i, bool turned) {
   const group *g = s->groups;
-  size_t i = first_group(s), first = i;
+  set_ways(s, 0, 1, 0);
   if (s->left == 1) {
-    set_ways(s, 0, 1, without == i ? -g[i].sign : g[i].sign);
+    set_ways(s, 0, 1, turned ? -g[i].sign : g[i].sign);
     return contour_forced_solve(&s->forced, NULL);
   }
-  do {
-    set_ways(s, g[i].from, g[i].to, i == without ? -g[i].sign : g[i].sign);
-    i = g[i].after;
-  } while (i != NONE && i != first);
-  i = first;
-  do { /* between groups of different sign the change may move */
-    size_t next = g[i].after;
-    if (next == NONE) break;
-    if (i != without && next != without) {
-      double from = uncertain_until(s, g[next].from, -1, &g[i]), to = uncertain_until(s, g[next].from, 1, &g[next]);
+  size_t begin = i, count = 1;
+  for (; count <= NEIGHBOURS && count < s->left && g[begin].before != NONE; count++) begin = g[begin].before;
+  for (size_t k = 0, end = i; k < NEIGHBOURS && count < s->left && g[end].after != NONE; k++, count++)
+    end = g[end].after;
+  for (size_t k = 0, at = begin; k < count; k++, at = g[at].after)
+    set_ways(s, g[at].from, g[at].to, turned && at == i ? -g[at].sign : g[at].sign);
+  for (size_t k = 0, at = begin; k < count; k++) { /* between groups of different sign the change may move */
+    size_t next = g[at].after;
+    if (next == NONE || (k + 1 == count && count < s->left)) break;
+    if (!turned || (at != i && next != i)) {
+      double from = uncertain_until(s, g[next].from, -1, &g[at]), to = uncertain_until(s, g[next].from, 1, &g[next]);
       set_ways(s, from < 0 ? from + 1 : from, from < 0 ? to + 1 : to, 0);
     }
-    i = next;
-  } while (i != first);
+    at = next;
+  }
   return contour_forced_solve(&s->forced, NULL);
 }
 
@@ -289,14 +293,12 @@ static size_t count_points(const search *s, double from, double to) {
 }
 
 static batten_status find_significances(batten_context *ctx, search *s) {
-  double least = NAN;
   for (size_t i = 0; i < s->count; i++) {
     group *g = &s->groups[i];
     if (g->joined || !isnan(g->significance)) continue;
     batten_status st = batten_progress(ctx, "inflections", 0.5);
     if (st < 0) return st;
-    if (isnan(least)) least = cost(s, NONE);
-    double rise = cost(s, i) - least;
+    double rise = cost(s, i, true) - cost(s, i, false);
     g->significance = rise > 0 ? sqrt(rise) / s->noise : 0;
     if (s->left > 1 && count_points(s, g->from, g->to) < POINTS_MIN) g->significance = 0;
   }
@@ -405,7 +407,10 @@ batten_status contour_bends_find(batten_context *ctx, const contour_smooth *smoo
   batten_status st = find_runs(ctx, &s);
   if (st >= 0) {
     join_noise(&s);
-    st = contour_forced_new(ctx, smooth, smooth->lambda, &s.forced);
+    /* lambda is the square of the noise over what is expected of the third derivative: where more noise is taken for
+     * granted than the data have, the rise of the sum is that of this larger lambda. */
+    double more = s.noise / fmax(smooth->noise, CONTOUR_EXACT * smooth->size);
+    st = contour_forced_new(ctx, smooth, smooth->lambda * fmax(1, more * more), &s.forced);
   }
   if (st >= 0) st = join_insignificant(ctx, &s, significance);
   if (st >= 0 && s.left > 1) {

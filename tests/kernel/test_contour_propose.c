@@ -376,6 +376,26 @@ static batten_status one_call(batten_context *ctx, void *arg) {
   return st;
 }
 
+/* Many bends that are each small beside the whole, of exact data and of almost exact ones: all are seen. */
+static void test_many(batten_context *ctx) {
+  enum { WAVES = 20, PER_WAVE = 60, COUNT = WAVES * PER_WAVE };
+  double *points = malloc(2 * COUNT * sizeof *points);
+  for (int noisy = 0; noisy < 2; noisy++) {
+    uint64_t seed = 1;
+    for (size_t i = 0; i < COUNT; i++) {
+      double x = (double)i / (COUNT - 1) * WAVES;
+      points[2 * i] = x;
+      points[2 * i + 1] = 0.3 * sin(2 * SCENE_PI * x) + noisy * 1e-3 * (t_uniform(&seed) - 0.5);
+    }
+    batten_contour_proposal p;
+    T_OK(batten_contour_propose(ctx, COUNT, points, NULL, &p), ctx);
+    T_CHECK(p.inflection_count == 2 * WAVES - 1, "%d waves%s: %zu inflections", WAVES, noisy ? " with noise" : "",
+            p.inflection_count);
+    batten_contour_proposal_free(ctx, &p);
+  }
+  free(points);
+}
+
 int main(void) {
   batten_context *ctx = t_context(NULL, NULL, 1);
   waves(ctx);
@@ -391,6 +411,7 @@ int main(void) {
   t_fail_every_allocation("batten_contour_propose", one_call, &s);
   t_cancel_every_progress("batten_contour_propose", one_call, &s);
   contour_scene_free(&s);
+  test_many(ctx);
   batten_context_free(ctx);
   return t_done();
 }
