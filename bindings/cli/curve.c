@@ -67,7 +67,8 @@ static const cli_option table[] = {
     {"parameters", OPT_PARAMETERS, "HOW",
      "chord, centripetal, uniform, foley, or file (column t); default file, else chord"},
     {"domain", OPT_DOMAIN, "T0,T1",
-     "of the file's parameters; closed curves: T1 is where the first point comes again"},
+     "of the file's parameters; closed curves: T1 is where the first point comes again, by\n"
+     "default where it does in the file"},
     {"ends", OPT_ENDS, "HOW", "free, or fixed: the curve begins and ends in the first and last point; default free"},
     {"start-tangent", OPT_START_TANGENT, "X,Y", "direction in which the curve begins"},
     {"end-tangent", OPT_END_TANGENT, "X,Y", "direction in which it ends"},
@@ -78,7 +79,7 @@ static const cli_option table[] = {
     {"tension", OPT_TENSION, "W", "weight of stiffness beside the mean square distance; default 1e-12"},
     {"margin", OPT_MARGIN, "M", "inequalities hold by this part of what the reference has; default 1e-3"},
     {"construction", OPT_CONSTRUCTION, "N",
-     "of the reference: 1 (directions of legs), 2 (removal of knots); default: the nearer of both"},
+     "of the reference: 1 (directions of legs) or 2 (removal of knots); default: the nearer"},
     {"unit", OPT_UNIT, "NAME", "of lengths in STEP and IGES: mm, cm, m or inch; default mm"},
     {"deviation", OPT_DEVIATION, "T", "of polylines and points from the curve; default 1e-4 of its size"},
     {"size", CLI_KEY_SIZE, "W,H", "picture's size in pixels; default 1600 wide and as high as it needs"},
@@ -268,6 +269,23 @@ static bool has_output(const curve_work *w, cli_output_kind kind) {
   return false;
 }
 
+/* Parameters of a closed contour tell where the first point comes again if it is there again, as in the .csv that is
+ * written. */
+static batten_status find_period(curve_work *w, curve_item *item) {
+  batten_contour_options *o = &item->options;
+  if (!o->closed || !o->parameters || !isnan(o->domain[0])) return BATTEN_OK;
+  const double *first = item->points, *last = item->points + 2 * (item->count - 1);
+  if (item->count < 2 || first[0] < last[0] || first[0] > last[0] || first[1] < last[1] || first[1] > last[1])
+    return batten_fail(
+        w->run.ctx, BATTEN_E_INVALID,
+        "points: closed contour %zu has parameters, but does not tell where its first point comes again; "
+        "repeat it at the end, or give --domain",
+        item->number);
+  o->domain[0] = o->parameters[0];
+  o->domain[1] = o->parameters[item->count - 1];
+  return BATTEN_OK;
+}
+
 /* Contour i of the file becomes item k. */
 static batten_status take_contour(curve_work *w, size_t i, size_t k) {
   const curve_request *q = w->request;
@@ -289,6 +307,8 @@ static batten_status take_contour(curve_work *w, size_t i, size_t k) {
     if (!item->options.sign) item->options.sign = wish->sign;
   }
   if (c->planes) w->planes[k] = c->planes[i];
+  batten_status st = find_period(w, item);
+  if (st < 0) return st;
   item->parameters = batten_alloc_array(w->run.ctx, item->count, sizeof *item->parameters);
   return item->parameters ? BATTEN_OK : BATTEN_E_NOMEM;
 }

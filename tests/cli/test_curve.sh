@@ -152,6 +152,11 @@ run 1 "straight.txt: contour 1: points: all 3 are one point or lie on a line" cu
 check "nothing is written when one contour of several fails" test ! -e straight.json
 run 0 "" curve straight.txt --quiet --contour 2 -o straight.json
 is one.json lsq "$(python3 -c 'import json; print(json.load(open("stack.report.json"))["contour_lsq"][1])')"
+run 0 "" curve stack.csv --quiet --closed --correction 0 --report again.json
+holds again.json points 'x > 153'
+holds again.json max_error 'x < 0.01'
+run 1 "points: closed contour 0 has parameters, but does not tell where its first point comes again" curve weights.csv --closed
+run 0 "" curve weights.csv --quiet --closed --domain 5,9
 run 0 "" inspect stack.json --report i.json
 is i.json kind curves
 
