@@ -133,13 +133,11 @@ void curves_report_measures(size_t count, const batten_curve_measures *m, cli_re
   cli_report_number(r, "curvature_max_at", m[t.max_curve].curvature_max_at);
   cli_report_count(r, "curvature_min_curve", t.min_curve);
   cli_report_count(r, "curvature_max_curve", t.max_curve);
-  cli_report_number(r, "turn", count == 1 ? m[0].turn * DEGREES : NAN);
+  cli_report_number(r, "turn", count == 1 ? turn_of(&m[0]) : NAN);
   cli_report_number(r, "energy", t.energy);
   cli_report_count(r, "inflections", t.inflections);
   report_lists(count, m, r);
 }
-
-static double in_degrees(double radians) { return radians * (180 / acos(-1)); }
 
 /* A line for each of several curves, as far as a screen goes. */
 static void print_each(size_t count, const batten_curve_measures *m) {
@@ -148,7 +146,7 @@ static void print_each(size_t count, const batten_curve_measures *m) {
     char name[32];
     snprintf(name, sizeof name, "curve %zu", i);
     cli_line(name, "length %.6g, area %.6g, curvature %.4g .. %.4g, turn %.4g degrees, %zu inflection%s", m[i].length,
-             m[i].area, m[i].curvature_min, m[i].curvature_max, in_degrees(m[i].turn), m[i].inflections,
+             m[i].area, m[i].curvature_min, m[i].curvature_max, turn_of(&m[i]), m[i].inflections,
              m[i].inflections == 1 ? "" : "s");
   }
   if (count > SHOWN) cli_line("...", "%zu more, see --report", count - SHOWN);
@@ -166,7 +164,7 @@ void curves_print_measures(size_t count, const batten_curve_measures *m) {
   else
     cli_line("curvature", "%.4g of curve %zu .. %.4g of curve %zu", m[t.min_curve].curvature_min, t.min_curve,
              m[t.max_curve].curvature_max, t.max_curve);
-  if (count == 1) cli_line("turn", "%.6g degrees", in_degrees(m[0].turn));
+  if (count == 1) cli_line("turn", "%.6g degrees", turn_of(&m[0]));
   cli_line("energy", "%.6g", t.energy);
   cli_line("inflections", "%zu", t.inflections);
   if (count > 1) print_each(count, m);

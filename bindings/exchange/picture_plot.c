@@ -205,6 +205,19 @@ static batten_status lay_out(batten_context *ctx, unsigned rows, unsigned column
 
 /* ---- drawing ------------------------------------------------------------------------------------- */
 
+/* Text in a room: in smaller letters, and cut when those would be too small to read. */
+static void draw_text(picture_sheet *s, double x, double y, double height, double room, int anchor, unsigned color,
+                      const char *text) {
+  const double least = 6;
+  char shown[256];
+  double width = picture_text_width(height, text);
+  if (width > room) height = fmax(fmin(least, height), height * room / width);
+  snprintf(shown, sizeof shown, "%s", text);
+  for (size_t n = strlen(shown); n > 4 && picture_text_width(height, shown) > room * (1 + 1e-9); n--)
+    memcpy(shown + n - 4, "...", 4);
+  sheet_text(s, x, y, height, anchor, color, shown);
+}
+
 static void draw_axes(picture_sheet *s, const plot_view *v) {
   const picture_frame *f = &v->frame;
   double room[2] = {f->x1 - f->x0, f->y1 - f->y0}, unit = v->unit, step[2];
@@ -230,7 +243,7 @@ static void draw_axes(picture_sheet *s, const plot_view *v) {
     double y = frame_y(f, picture_tick_value(&ticks[1], i));
     sheet_line(s, f->x0, y, f->x1, y, 1, GRID);
     picture_tick_text(&ticks[1], i, text);
-    sheet_text(s, f->x0 - 0.8 * unit, y + 0.42 * unit, SMALL * unit, 2, INK, text);
+    draw_text(s, f->x0 - 0.8 * unit, y + 0.42 * unit, SMALL * unit, (LEFT - 1) * unit, 2, INK, text);
   }
   sheet_line(s, f->x0, f->y0, f->x1, f->y0, 1.2, FRAME);
   sheet_line(s, f->x0, f->y1, f->x1, f->y1, 1.2, FRAME);
@@ -268,19 +281,6 @@ static void draw_layer(picture_sheet *s, const plot_view *v, const batten_plot_l
       sheet_marks(s, &v->frame, l->count, l->points, l->kind == BATTEN_PLOT_CROSSES ? SHEET_CROSS : SHEET_RING,
                   mark_radius(l, v, side), fmax(1.2, 1.4e-3 * side), l->color);
   }
-}
-
-/* Text in a room: in smaller letters, and cut when those would be too small to read. */
-static void draw_text(picture_sheet *s, double x, double y, double height, double room, int anchor, unsigned color,
-                      const char *text) {
-  const double least = 6;
-  char shown[256];
-  double width = picture_text_width(height, text);
-  if (width > room) height = fmax(fmin(least, height), height * room / width);
-  snprintf(shown, sizeof shown, "%s", text);
-  for (size_t n = strlen(shown); n > 4 && picture_text_width(height, shown) > room * (1 + 1e-9); n--)
-    memcpy(shown + n - 4, "...", 4);
-  sheet_text(s, x, y, height, anchor, color, shown);
 }
 
 static void draw_sample(picture_sheet *s, const plot_view *v, const batten_plot_layer *l, double right, double middle,

@@ -146,6 +146,15 @@ static void test_narrow(batten_context *ctx) {
   T_CHECK(inked(&p, 0, 150) == 0 && inked(&p, 292, 300) == 0 && inked(&p, 150, 292) > 1000,
           "nothing beyond the plot: %zu pixels before it, %zu behind it", inked(&p, 0, 150), inked(&p, 292, 300));
   free(p.rgb);
+  const double far[] = {4e6, -5500000.25, 4000000.5, -5500000.5};
+  batten_plot_layer line = {.count = 2, .points = far};
+  batten_plot beside[2] = {{0}, {.layer_count = 1, .layers = &line}};
+  batten_picture_options wide = small(800, 600);
+  T_OK(batten_picture_plots(ctx, 1, 2, beside, &wide, png), ctx);
+  p = read_png(png);
+  T_CHECK(inked(&p, 0, 400) == 0 && inked(&p, 400, 430) > 20, "long numbers stay beside the frame: %zu, %zu pixels",
+          inked(&p, 0, 400), inked(&p, 400, 430));
+  free(p.rgb);
   T_OK(batten_picture_plots(ctx, 1, 2, plots, &o, svg), ctx);
   FILE *f = fopen(svg, "r");
   if (f) text[fread(text, 1, sizeof text - 1, f)] = '\0';
