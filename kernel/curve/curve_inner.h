@@ -66,6 +66,9 @@ double curve_span_at(const bspline *space, size_t mu, double u);
 double curve_span_part(const bspline *space, size_t mu, double t);
 /* Bezier points [degree + 1][2] at u. */
 void curve_net_at(unsigned degree, const double (*net)[2], double u, double out[2]);
+/* Bernstein coefficients c [n + 1][dim] become those over [from, to], 0 <= from < to: towards one end of the whole,
+ * and of that towards the other end. */
+void curve_restrict(unsigned n, unsigned dim, double from, double to, double *c);
 
 /* What is integrated by u: the first number is the speed |x'|, all [CURVE_INTEGRALS]. */
 enum { CURVE_INTEGRALS = 3, CURVE_DEPTH = 44 };
@@ -75,8 +78,8 @@ void curve_speed(const curve_piece *piece, double u, double *out);
 double curve_gauss_speed(const curve_piece *piece, double from, double to);
 
 /* Walks over [from, to] in parts on which the rule of Gauss and Legendre has the integrals to 1e-13 of the length or,
- * where that is more, of themselves: over the halves of a part they are the same as over the whole. Parts that
- * contain a cusp become so short that they do not count. */
+ * where that is more, of themselves: over the halves of a part they are the same as over the whole, and x' is nowhere
+ * near 0. Parts that contain a cusp become so short that they do not count. */
 typedef struct curve_walk {
   const curve_piece *piece;
   curve_integrand *integrand;

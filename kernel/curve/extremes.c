@@ -26,17 +26,6 @@ typedef struct polynomial {
   double c[TERMS];
 } polynomial;
 
-/* The coefficients over [from, to]: towards one end of the whole, and of that towards the other end. */
-static void restrict_to(const polynomial *p, double from, double to, double *out) {
-  unsigned n = p->degree;
-  memcpy(out, p->c, (n + 1) * sizeof *out);
-  for (unsigned level = 1; level <= n; level++)
-    for (unsigned k = n; k >= level; k--) out[k] = (1 - to) * out[k - 1] + to * out[k];
-  double part = from / to;
-  for (unsigned level = 1; level <= n && from > 0; level++)
-    for (unsigned k = 0; k + level <= n; k++) out[k] = (1 - part) * out[k] + part * out[k + 1];
-}
-
 static double value_at(const polynomial *p, double u) {
   double work[TERMS];
   memcpy(work, p->c, (p->degree + 1) * sizeof *work);
@@ -94,7 +83,8 @@ static bool next_root(const polynomial *p, root_walk *w, double *root) {
   while (!w->done && w->visits < VISITS) {
     double width = ldexp(1, -(int)w->depth), from = w->index * width, to = from + width, c[TERMS];
     bool rises, quiet;
-    restrict_to(p, from, to, c);
+    memcpy(c, p->c, (p->degree + 1) * sizeof *c);
+    curve_restrict(p->degree, 1, from, to, c);
     unsigned changes = count_changes(p, c, &rises, &quiet);
     w->visits++;
     if (changes > 1 && w->depth < DEPTH) {
@@ -219,6 +209,7 @@ static bool may_exceed(const extremes *e, const curve_piece *piece, const rows *
   for (unsigned i = 0; i <= n; i++)
     for (int x = 0; x < 2; x++) sum[x] += piece->first[i][x];
   double length = hypot(sum[0], sum[1]), most = largest(n, (const double(*)[2])piece->first);
+  if (!(length > 0)) return true; /* it ends where it begins */
   for (unsigned i = 0; i <= n; i++)
     least = fmin(least, (piece->first[i][0] * sum[0] + piece->first[i][1] * sum[1]) / length);
   if (!(least > 1e-8 * most) || isnan(e->value[0])) return true;

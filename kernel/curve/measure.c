@@ -35,19 +35,6 @@ static double piece_area(const curve_piece *piece) {
 
 enum { DEPTH = 50 };
 
-/* Bezier points of x' over a part of a piece. */
-static void restrict_to(const curve_piece *piece, double from, double to, double (*out)[2]) {
-  unsigned n = piece->degree - 1;
-  memcpy(out, piece->first, (n + 1) * sizeof *out);
-  for (unsigned level = 1; level <= n; level++)
-    for (unsigned k = n; k >= level; k--)
-      for (unsigned x = 0; x < 2; x++) out[k][x] = (1 - to) * out[k - 1][x] + to * out[k][x];
-  double part = from / to;
-  for (unsigned level = 1; level <= n && from > 0; level++)
-    for (unsigned k = 0; k + level <= n; k++)
-      for (unsigned x = 0; x < 2; x++) out[k][x] = (1 - part) * out[k][x] + part * out[k + 1][x];
-}
-
 static double dot(const double a[2], const double b[2]) { return a[0] * b[0] + a[1] * b[1]; }
 
 static double angle(const double from[2], const double to[2]) {
@@ -92,7 +79,8 @@ static void piece_turn(const curve_piece *piece, turning *t) {
   for (unsigned i = 0; i <= n; i++) most = fmax(most, fmax(fabs(piece->first[i][0]), fabs(piece->first[i][1])));
   for (;;) {
     double width = ldexp(1, -(int)depth), net[BSPLINE_ORDER][2];
-    restrict_to(piece, index * width, (index + 1) * width, net);
+    memcpy(net, piece->first, (n + 1) * sizeof *net);
+    curve_restrict(n, 2, index * width, (index + 1) * width, net[0]);
     if (!turn_along(t, n, (const double(*)[2])net, 4 * DBL_EPSILON * most, depth == DEPTH)) {
       depth++;
       index *= 2;

@@ -82,12 +82,22 @@ void curve_net_at(unsigned degree, const double (*net)[2], double u, double out[
   memcpy(out, work[0], sizeof work[0]);
 }
 
+void curve_restrict(unsigned n, unsigned dim, double from, double to, double *c) {
+  for (unsigned level = 1; level <= n; level++)
+    for (unsigned k = (n + 1) * dim - 1; k >= level * dim; k--) c[k] = (1 - to) * c[k - dim] + to * c[k];
+  double part = from / to;
+  for (unsigned level = 1; level <= n && from > 0; level++)
+    for (unsigned k = 0; k < (n + 1 - level) * dim; k++) c[k] = (1 - part) * c[k] + part * c[k + dim];
+}
+
 /* ---- integrals ----------------------------------------------------------------------------------- */
 
 /* Parts of a span that are asked to have the integrals to SAME; there are more only where rounding must be what
  * differs, and the more there are the less is asked. */
 enum { LEAVES = 200, LEAVES_PER_BIT = 4 };
 static const double SAME = 1e-13;
+/* On such a part x' goes one way everywhere, by at least so much of its largest size. */
+static const double STEADY = 0.1;
 
 void curve_speed(const curve_piece *piece, double u, double *out) {
   double first[2];
@@ -127,6 +137,22 @@ void curve_walk_start(curve_walk *walk, const curve_piece *piece, curve_integran
   integrate(piece, integrand, from, to, walk->stack[0].whole);
 }
 
+/* Whether x' comes nowhere near 0 on a part: what it does in a place narrower than the rule's nodes are apart, the
+ * halves may miss as the whole does. */
+static bool is_steady(const curve_piece *piece, double from, double to) {
+  unsigned n = piece->degree - 1;
+  double net[BSPLINE_ORDER][2], sum[2] = {0, 0}, least = INFINITY, most = 0;
+  memcpy(net, piece->first, (n + 1) * sizeof *net);
+  curve_restrict(n, 2, from, to, net[0]);
+  for (unsigned i = 0; i <= n; i++)
+    for (int x = 0; x < 2; x++) sum[x] += net[i][x];
+  for (unsigned i = 0; i <= n; i++) {
+    least = fmin(least, net[i][0] * sum[0] + net[i][1] * sum[1]);
+    most = fmax(most, hypot(net[i][0], net[i][1]));
+  }
+  return least >= STEADY * most * hypot(sum[0], sum[1]);
+}
+
 bool curve_walk_next(curve_walk *walk, double *from, double *to, double integrals[CURVE_INTEGRALS]) {
   if (walk->height == 0) return false;
   for (;;) {
@@ -143,7 +169,7 @@ bool curve_walk_next(curve_walk *walk, double *from, double *to, double integral
       double size = fmax(fabs(integrals[k]), length), allowed = (asked + noise / length) * size;
       if (!(fabs(integrals[k] - whole[k]) <= allowed)) same = false;
     }
-    if (same || length <= 1e-17 * walk->most || walk->height > CURVE_DEPTH) {
+    if ((same && is_steady(walk->piece, a, b)) || length <= 1e-17 * walk->most || walk->height > CURVE_DEPTH) {
       walk->height--;
       walk->leaves++;
       *from = a;

@@ -62,6 +62,30 @@ static void test_known(batten_context *ctx) {
 
 /* ---- closed -------------------------------------------------------------------------------------- */
 
+/* ((t - c)^2 / 2, e (t - c)) has the speed sqrt((t - c)^2 + e^2): where it is least may be narrower than any rule's
+ * nodes are apart, and next to the end. */
+static void test_slow(batten_context *ctx) {
+  double worst = 0;
+  for (int k = 0; k < 8; k++) {
+    double c = 0.5, e = k ? pow(10, -k) : 0;
+    curve_case slow = {.degree = 2,
+                       .knot_count = 6,
+                       .knots = {0, 0, 0, 1, 1, 1},
+                       .control = {{0.125, -0.5 * e}, {-0.125, 0}, {0.125, 0.5 * e}}};
+    batten_curve *curve = curve_case_make(ctx, &slow);
+    for (int i = 1; i < 400; i++) {
+      double t = i / 400.0, length = 0;
+      for (int side = 0; side < 2; side++) {
+        double a = side ? t - c : c;
+        length += 0.5 * a * hypot(a, e) + (e > 0 ? 0.5 * e * e * asinh(a / e) : 0);
+      }
+      worst = fmax(worst, fabs(length_of(ctx, curve, 0, t) - length));
+    }
+    batten_curve_free(curve);
+  }
+  T_RATIO(worst, 1e-15, "lengths up to places at which curves are slow");
+}
+
 static void test_closed(batten_context *ctx) {
   /* A square of side 1, its sides of different spans. */
   const curve_case c = {.degree = 1,
@@ -265,6 +289,7 @@ int main(void) {
   uint64_t state = 61;
   curve_case c = curve_case_random(&state, 3, 8, 2, 0, 0, 1);
   test_known(ctx);
+  test_slow(ctx);
   test_closed(ctx);
   test_random(ctx);
   test_threads();

@@ -196,6 +196,30 @@ static void test_random(batten_context *ctx) {
 
 /* ---- invariances --------------------------------------------------------------------------------- */
 
+/* Closed curves of one span: x' has no mean direction. */
+static void test_one_span(batten_context *ctx) {
+  enum { PLACES = 501 };
+  static batten_curve_point points[PLACES];
+  double places[PLACES];
+  uint64_t state = 77;
+  size_t missed = 0;
+  for (int i = 0; i < PLACES; i++) places[i] = i / (PLACES - 1.0);
+  for (unsigned i = 0; i < 40; i++) {
+    curve_case c = curve_case_random(&state, 3 + i % 7, 0, 1, 1, 0, 1);
+    batten_curve *curve = curve_case_make(ctx, &c);
+    batten_curve_measures m = {.curvature_max = NAN};
+    if (batten_curve_measure(ctx, curve, &m) < 0 || batten_curve_evaluate(ctx, curve, PLACES, places, points) < 0)
+      missed++;
+    for (int k = 0; k < PLACES; k++) {
+      double slack = 1e-9 * fmax(1, fabs(points[k].curvature));
+      if (!(points[k].curvature <= m.curvature_max + slack && points[k].curvature >= m.curvature_min - slack))
+        missed++;
+    }
+    batten_curve_free(curve);
+  }
+  T_CHECK(missed == 0, "closed curves of one span: %zu places bend more than is said", missed);
+}
+
 static void test_moved(batten_context *ctx) {
   uint64_t state = 71;
   curve_case c = curve_case_random(&state, 4, 5, 1, 1, 0, 1);
@@ -256,6 +280,7 @@ int main(void) {
   test_degenerate(ctx);
   test_random(ctx);
   test_moved(ctx);
+  test_one_span(ctx);
   T_STATUS(batten_curve_measure(ctx, NULL, &m), BATTEN_E_INVALID, ctx, "curve: NULL");
   batten_curve *curve = curve_case_make(ctx, &c);
   T_STATUS(batten_curve_measure(ctx, curve, NULL), BATTEN_E_INVALID, ctx, "out: NULL");
