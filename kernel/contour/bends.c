@@ -1,8 +1,8 @@
-/* Which runs of the curvature plot count.
+/* The curvature plot of the smoothing spline, and which of its runs of one sign count.
  *
  * Between the zeros of the smoothed data's curvature lie runs of one sign. What speaks for a run is by how much the
  * fit worsens without it: the smoothing spline is fitted again with the run's sign turned into that of its
- * neighbours (forced.c). The rise of the sum, in squares of the noise, is about chi-squared where the run is but
+ * neighbours (smooth_forced.c). The rise of the sum, in squares of the noise, is about chi-squared where the run is but
  * noise; its root is the run's significance, in standard deviations. The least significant run joins its neighbours,
  * until all that are left are significant [backward elimination]. So straight pieces, the ringing of a smooth curve
  * beside a corner, and wiggles do not count, and a weak but long bend does.
@@ -15,7 +15,7 @@
 #include <string.h>
 
 #include "base/checked.h"
-#include "forced.h"
+#include "smooth_forced.h"
 
 /* Curvature that is so small a part of its standard deviation has no sign. */
 static const double NO_SIGN = 1e-3;
@@ -25,9 +25,65 @@ static const double CERTAIN = 2;
 static const double NOISE_ALONE = 1;
 /* Between two inflections, and beyond the last one, lie so many points, or nothing speaks for a run. */
 enum { POINTS_MIN = 2 };
-enum { BISECTIONS = 40, PLACES = 64 };
+enum { PER_SPAN = 4, BISECTIONS = 40, PLACES = 64 }; /* PER_SPAN: samples of the plot */
 /* Groups on either side of one that is turned, whose signs are kept. */
 enum { NEIGHBOURS = 2 };
+
+/* ---- the plot ----------------------------------------------------------------------------------- */
+
+/* Of the curvature [x', x''] / |x'|^3 only the part that x'' has, along the normal, is uncertain to speak of. */
+static void sample_at(const contour_smooth *s, double t, double *out, double *angle) {
+  double jet[3][2];
+  contour_smooth_jet(s, s->control, t, jet);
+  double speed2 = jet[1][0] * jet[1][0] + jet[1][1] * jet[1][1], speed = sqrt(speed2);
+  out[0] = t;
+  out[1] = speed > 0 ? contour_cross(jet[1], jet[2]) / (speed2 * speed) : 0;
+  out[2] =
+      speed > 0 ? fmax(s->noise, CONTOUR_EXACT * s->size) * sqrt(contour_smooth_variance(s, t)) / speed2 : INFINITY;
+  *angle = atan2(jet[1][1], jet[1][0]);
+}
+
+batten_status contour_plot_make(batten_context *ctx, const contour_smooth *s, contour_plot *out) {
+  contour_plot p = {.count = PER_SPAN * s->spans + 1};
+  p.samples = batten_alloc_array(ctx, p.count, 4 * sizeof(double));
+  p.angles = p.samples ? batten_alloc_array(ctx, p.count, sizeof(double)) : NULL;
+  if (!p.angles) {
+    batten_free(ctx, p.samples);
+    return BATTEN_E_NOMEM;
+  }
+  const double pi = acos(-1);
+  double length = 0, before[3][2], jet[3][2];
+  for (size_t i = 0; i < p.count; i++) {
+    double t = (double)i / (double)(p.count - 1), angle, *at = p.samples + 4 * i;
+    sample_at(s, t, at, &angle);
+    if (i > 0) {
+      double middle[3][2], h = 1 / (double)(p.count - 1);
+      contour_smooth_jet(s, s->control, t - 0.5 * h, middle);
+      contour_smooth_jet(s, s->control, t, jet);
+      length +=
+          h / 6 *
+          (hypot(before[1][0], before[1][1]) + 4 * hypot(middle[1][0], middle[1][1]) + hypot(jet[1][0], jet[1][1]));
+      double turn = angle - p.angles[i - 1];
+      p.angles[i] = p.angles[i - 1] + turn - 2 * pi * round(turn / (2 * pi));
+    } else {
+      contour_smooth_jet(s, s->control, t, jet);
+      p.angles[0] = angle;
+    }
+    for (int k = 0; k < 2; k++) before[1][k] = jet[1][k];
+    at[3] = length;
+  }
+  *out = p;
+  return BATTEN_OK;
+}
+
+void contour_plot_free(batten_context *ctx, contour_plot *p) {
+  if (!p) return;
+  batten_free(ctx, p->angles);
+  batten_free(ctx, p->samples);
+  *p = (contour_plot){0};
+}
+
+/* ---- runs --------------------------------------------------------------------------------------- */
 
 /* Runs that are joined: a part of a ring or chain of all that are left. */
 typedef struct group {

@@ -1,25 +1,31 @@
 /* The map of kernel/contour, and what its parts say to each other.
  *
- * parameters.c   batten_contour_parametrize
- * smooth.c       the smoothing spline of data, and the noise that it tells
- * forced.c       the same with given signs of curvature
- * plot.c         curvature along it, and how sure it is
- * bends.c        runs of one sign in the plot, and which of them count
- * propose.c      what is asked for of these
- * knots.c        where breaks are placed, and how many
- * density.c      how densely: as the data lie, and as a pilot needs them
- * layout.c       breaks, inflections and signs of pieces
- * space.c        curves that satisfy the equalities: the unknowns
- * objective.c    sum of squares and tension in banded form; their minimum
- * reference*.c   a curve of the wanted shape near the data [section 2.2 (i)]
- * wedges.c       where the reference bends clearly enough for linear inequalities, by bisection [section 2.2 (ii)]
- * rows.c         those inequalities as rows
- * program.c      the quadratic program of a round [section 2.2 (iii)]
- * correct.c      parameter correction
- * judge.c        noise, or data of another shape
- * options.c      defaults and ranges
- * input.c        data that make no sense; scales
- * fit.c          batten_contour_fit: scales, rounds, certificate
+ * input.c          data that make no sense; scales
+ * options.c        defaults and ranges
+ * parameters.c     batten_contour_parametrize
+ *
+ * propose.c        batten_contour_propose: what is asked for of the runs of bends.c
+ * bends            the curvature plot of the smoothing spline, its runs of one sign, and which of them count
+ * smooth           the smoothing spline of data, and the noise that it tells
+ * smooth_forced    the same with given signs of curvature
+ *
+ * layout           breaks, inflections and signs of pieces
+ * knots.c          where breaks are placed, and how many
+ * density          how densely: as the data lie, and as a pilot fit without inequalities needs them
+ *
+ * fit.c            batten_contour_fit: scales, rounds, certificate
+ * space.c          curves that satisfy the equalities: the unknowns
+ * objective.c      sum of squares and tension in banded form; their minimum
+ * reference        a curve of the wanted shape near the data [section 2.2 (i)]: which of two constructions,
+ *   _legs.c        prescribed directions of legs, and
+ *   _removal.c     least squares on fewer knots
+ * wedges           where the reference bends clearly enough for linear inequalities, by bisection [section 2.2 (ii)]
+ * rows.c           those inequalities as rows
+ * program.c        the quadratic program of a round [section 2.2 (iii)]
+ * correct.c        parameter correction
+ * judge.c          noise, or data of another shape
+ *
+ * Names without ending are a .c with its own .h; all else is declared here.
  *
  * In all of it points are scaled to a box of size about 1 around 0 (by a power of two), parameters and breaks are in
  * [0, 1], and control points are [n][2], those of a clamped B-spline; where they are unknowns of a matrix, coordinate
@@ -105,8 +111,9 @@ typedef struct contour_knots_options {
 batten_status contour_knots_place(batten_context *ctx, const contour_data *data, const double *parameters,
                                   const contour_knots_options *opt, size_t *pieces, double **breaks);
 
-/* Up to `passes` steps of each point to a nearer place; parameters [count] stay in [0, 1] (closed: go round). The first
- * point at 0 and the last at 1 stay there (but closed). No distance rises. squares [count]: squared distances from the new places. On the context's threads. */
+/* Up to `passes` steps of each point to a nearer place; parameters [count] stay in [0, 1] (closed: go round). The
+ * first point at 0 and the last at 1 stay there (but closed). No distance rises. squares [count]: squared distances
+ * from the new places. On the context's threads. */
 void contour_correct(batten_context *ctx, const bspline *space, bool closed, const double *control,
                      const contour_data *data, unsigned passes, double *parameters, double *squares);
 

@@ -48,6 +48,8 @@ static batten_status check_parameters(batten_context *ctx, size_t count, const d
                          "opt.parameters[%zu]: %.17g is below the one before, %.17g; give the points in order", i,
                          t[i], t[i - 1]);
   }
+  if (!(t[0] < t[count - 1]))
+    return batten_fail(ctx, BATTEN_E_INVALID, "opt.parameters: all are %.17g; give points different ones", t[0]);
   return BATTEN_OK;
 }
 

@@ -14,7 +14,7 @@
 #include <string.h>
 
 #include "base/checked.h"
-#include "contour/contour_inner.h"
+#include "contour_inner.h"
 
 /* The part of what the reference has to spare by which sides are raised. */
 static const double INSIDE = 1e-9;

@@ -9,7 +9,7 @@
  * the better fit: both are made, and their sums compared. Where few spans turn far, references may have a higher
  * degree than smoothness + 1, for more control points. A cubic span with inflections at both ends is straight, for
  * its x'' is linear: there references begin with degree 4, which the space of the fit must have. */
-#include "reference_inner.h"
+#include "reference.h"
 
 #include "basis/refine.h"
 
@@ -101,11 +101,31 @@ static unsigned least_degree(const contour_shape *shape, const contour_ends *end
   return more ? least + 1 : least;
 }
 
-static const char *why_none(const reference_task *task, unsigned construction) {
-  if (construction == 2) return "knot removal does not find one; allow construction 1";
+/* What keeps a reference from being found: INFEASIBLE. */
+static batten_status none_found(batten_context *ctx, const reference_task *task, unsigned construction) {
+  /* Over spans shorter than this x'' of a curve of size one is little more than rounding, 1e-16 / NEAR^2. */
+  static const double NEAR = 1e-6;
+  static const char none[] = "no reference curve of the wanted shape";
+  const contour_shape *shape = task->shape;
+  size_t least = 0;
+  for (size_t i = 1; i < shape->spans; i++)
+    if (shape->breaks[i + 1] - shape->breaks[i] < shape->breaks[least + 1] - shape->breaks[least]) least = i;
+  double from = shape->breaks[least], width = shape->breaks[least + 1] - from;
+  if (width < NEAR)
+    return batten_fail(ctx, BATTEN_E_INFEASIBLE,
+                       "%s: two knots or inflections at %g (of [0, 1]) are only %.2g apart; leave out one of them",
+                       none, from, width);
+  if (construction == 2)
+    return batten_fail(ctx, BATTEN_E_INFEASIBLE, "%s: knot removal does not find one; allow construction 1", none);
   if (ends_fixed(task->ends))
-    return "the fixed ends contradict the signs of curvature, or leave no room; free them, or change the inflections";
-  return "runs between inflections turn too far for their number of spans; give more knots, or raise opt.depth_max";
+    return batten_fail(ctx, BATTEN_E_INFEASIBLE,
+                       "%s: the fixed ends contradict the signs of curvature, or leave no room; free them, or change "
+                       "the inflections",
+                       none);
+  return batten_fail(ctx, BATTEN_E_INFEASIBLE,
+                     "%s: runs between inflections turn too far for their number of spans; give more knots, or raise "
+                     "opt.depth_max",
+                     none);
 }
 
 batten_status contour_reference_find(batten_context *ctx, const contour_shape *shape, const contour_space *space,
@@ -115,7 +135,7 @@ batten_status contour_reference_find(batten_context *ctx, const contour_shape *s
   reference_task task = {shape, space, ends, data, parameters, tension, rows, least_degree(shape, ends)};
   if (task.degree > shape->degree)
     return batten_fail(ctx, BATTEN_E_INFEASIBLE,
-                       "inflections: between two of them a cubic piece is straight; give a knot between them, or "
+                       "opt.inflections: between two of them a cubic piece is straight; give a knot between them, or "
                        "degree 4");
   size_t n = 2 * space->b.count;
   double *by_legs = batten_alloc_array(ctx, n, sizeof *by_legs);
@@ -124,9 +144,7 @@ batten_status contour_reference_find(batten_context *ctx, const contour_shape *s
   batten_status st = by_legs && by_removal ? batten_progress(ctx, "reference", 0) : BATTEN_E_NOMEM;
   if (st >= 0 && construction != 1) st = reference_by_removal(ctx, &task, by_removal, &removal);
   if (st >= 0 && construction != 2) st = reference_by_legs(ctx, &task, by_legs, &legs);
-  if (st >= 0 && isinf(legs) && isinf(removal))
-    st = batten_fail(ctx, BATTEN_E_INFEASIBLE, "no reference curve of the wanted shape: %s",
-                     why_none(&task, construction));
+  if (st >= 0 && isinf(legs) && isinf(removal)) st = none_found(ctx, &task, construction);
   if (st >= 0) {
     out->construction = legs < removal ? 1 : 2;
     out->fallback = construction != 1 && isinf(removal);

@@ -13,7 +13,7 @@
  * everything is banded:
  *   min sum |x(t_i) - p_i|^2   [r_j, q_j] = 0,   r_j q_j >= least,   ratio of r_j q_j and r_(j + 1) q_(j + 1) bounded
  */
-#include "reference_inner.h"
+#include "reference.h"
 
 #include "base/checked.h"
 

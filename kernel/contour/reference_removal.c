@@ -9,7 +9,7 @@
  * once, those at which the jump of the highest derivative moves the curve least, so that there are about as many fits
  * as the logarithm of the number of knots. Where no knot is left to remove, tension grows. And spans count as wrong
  * already when x'' is nearly parallel to x': linear inequalities could not enclose the curve there. */
-#include "reference_inner.h"
+#include "reference.h"
 
 #include <math.h>
 #include <stdlib.h>

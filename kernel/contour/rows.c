@@ -21,7 +21,7 @@
 #include <string.h>
 
 #include "base/checked.h"
-#include "contour/wedges.h"
+#include "wedges.h"
 
 /* Rounds that make a place as straight, or as slow, as they may each leave `margin` of what it had: after some,
  * nothing that rounding does not swallow. Rows of first and second differences with little left keep this, or nine

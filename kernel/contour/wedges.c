@@ -13,7 +13,7 @@
  * these want more room, or with their second ones. So a direction that was near one side of its gap is put near the
  * other: what was at its limit becomes free. (Three such rounds do what four or five with u and v in the middle do.)
  */
-#include "contour/wedges.h"
+#include "wedges.h"
 
 #include <string.h>
 

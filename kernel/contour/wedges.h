@@ -10,7 +10,7 @@
 #ifndef BATTEN_CONTOUR_WEDGES_H
 #define BATTEN_CONTOUR_WEDGES_H
 
-#include "contour/contour_inner.h"
+#include "contour_inner.h"
 
 /* x' and x'' on a piece: rows [degree][degree + 1] and [degree - 1][degree + 1] of coefficients, as combinations of
  * the control points mu - degree .. mu. */

@@ -95,6 +95,9 @@ static void test_options(batten_context *ctx) {
   BAD((o->breaks = breaks, o->break_count = 1, o->closed = 1, o->inflection_count = 0), "3 at least");
   BAD(o->weights = weights, "opt.weights: all 0");
   BAD((weights[3] = -1, o->weights = weights), "opt.weights[3]: -1");
+  double same[40];
+  for (size_t i = 0; i < 40; i++) same[i] = 3;
+  BAD((o->parameters = same, o->domain[0] = 0, o->domain[1] = 5), "opt.parameters: all are 3");
   BAD((parameters[7] = 5, o->parameters = parameters), "opt.parameters[7]: 5 is below the one before");
   BAD((parameters[7] = NAN, o->parameters = parameters), "opt.parameters[7]: nan");
   BAD((parameters[7] = 7, o->parameters = parameters, o->closed = 1), "opt.domain: NaN");

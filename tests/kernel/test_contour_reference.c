@@ -423,6 +423,10 @@ static void test_strict(batten_context *ctx) {
       T_OK(contour_rows_make(ctx, &t.shape, &t.space.b, t.control, &t.rows, NULL, &accepted, NULL), ctx);
       kept += accepted;
     }
+  /* An inflection all but at the end. */
+  t.breaks[1] = 1e-12;
+  t.signs[0] = (signed char)-t.signs[1];
+  T_STATUS(trial_run(ctx, &t), BATTEN_E_INFEASIBLE, ctx, "two knots or inflections at 0 (of [0, 1]) are only 1e-12");
   T_CHECK(found + refused == 15 && kept == found && found >= 12, "strict rows: %zu references, %zu with rows", found,
           kept);
   trial_free(ctx, &t);

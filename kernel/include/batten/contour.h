@@ -129,13 +129,14 @@ typedef struct batten_contour_info {
  * BATTEN_OK          fitted, and proven to have exactly the wanted shape (info->shape.certified)
  * BATTEN_W_SHAPE     proven, but the data have another shape: they are three times as far from the curve as their
  *                    noise explains (misfit); or twice, where that is seen (0.3 % of the points' size above the fit
- *                    without inequalities) and chance would give it about once in 1,000 times. The text says where and by
- *                    how much.
+ *                    without inequalities) and chance would give it about once in 1,000 times. The text says where
+ *                    and by how much.
  * BATTEN_W_ACCURACY  not proven; the text says where
  * Same bits for any number of threads, and for points scaled by a power of two. Cost: O(count + spans) a round.
  * Fails: INVALID (points or weights that are not finite, all points equal or on one line, parameters out of order,
  * named; inflections without a knot between them where degree = smoothness + 1 = 3), INFEASIBLE (no curve has these
- * ends and that shape), NOMEM, TOO_LARGE, CANCELLED. */
+ * ends and that shape, or hardly one has; the text says why), SINGULAR (tension 0, and too few points for the spans),
+ * NOMEM, TOO_LARGE, CANCELLED. */
 BATTEN_API batten_status batten_contour_fit(batten_context *ctx, size_t count, const double *points,
                                             const batten_contour_options *opt, batten_curve **out, double *parameters,
                                             batten_curve **unconstrained, batten_contour_info *info);

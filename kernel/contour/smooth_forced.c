@@ -4,7 +4,7 @@
  * bends the wrong way gets a stiff spring that holds its [x', x''] / |x'| at 0, one that bends the right way none:
  * Newton's method for the sum with the squares of violations, which ends when the springs stay the same.
  *   [Bollaerts, Eilers, van Mechelen: Simple and multiple P-splines regression with shape constraints] */
-#include "forced.h"
+#include "smooth_forced.h"
 
 #include <string.h>
 

@@ -1,7 +1,7 @@
 /* The smoothing spline again, with its curvature kept to given signs: what that costs says how much the data speak
  * for the runs that it does not have. */
-#ifndef BATTEN_CONTOUR_FORCED_H
-#define BATTEN_CONTOUR_FORCED_H
+#ifndef BATTEN_CONTOUR_SMOOTH_FORCED_H
+#define BATTEN_CONTOUR_SMOOTH_FORCED_H
 
 #include "smooth.h"
 

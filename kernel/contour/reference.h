@@ -1,6 +1,6 @@
 /* What the two constructions of a reference share. */
-#ifndef BATTEN_CONTOUR_REFERENCE_INNER_H
-#define BATTEN_CONTOUR_REFERENCE_INNER_H
+#ifndef BATTEN_CONTOUR_REFERENCE_H
+#define BATTEN_CONTOUR_REFERENCE_H
 
 #include "contour_inner.h"
 
