@@ -2,10 +2,10 @@
  *
  * Between the zeros of the smoothed data's curvature lie runs of one sign. What speaks for a run is by how much the
  * fit worsens without it: the smoothing spline is fitted again with the run's sign turned into that of its
- * neighbours (smooth_forced.c). The rise of the sum, in squares of the noise, is about chi-squared where the run is but
- * noise; its root is the run's significance, in standard deviations. The least significant run joins its neighbours,
- * until all that are left are significant [backward elimination]. So straight pieces, the ringing of a smooth curve
- * beside a corner, and wiggles do not count, and a weak but long bend does.
+ * neighbours (smooth_forced.c). The rise of the sum, in squares of the noise, is about chi-squared where the run is
+ * but noise; its root is the run's significance, in standard deviations. The least significant run joins its
+ * neighbours, until all that are left are significant [backward elimination]. So straight pieces, the ringing of a
+ * smooth curve beside a corner, and wiggles do not count, and a weak but long bend does.
  *
  * Runs that noise explains many times over join first, without fits: where curvature is less than its standard
  * deviation. An inflection lies where the sign is as likely the one before as the one after: in a straight piece that
