@@ -1,7 +1,7 @@
 """Curves through points of the plane by batten and by others, on the same points in the same run.
 
-Ways by least squares have the same parameters and knots: they differ in time, by rounding, and by batten's tension of
-1e-12. Ways with a tolerance choose their knots themselves; those of batten have the wanted inflections too, and nobody
+Ways by least squares have the same parameters and knots: they differ in time, by rounding, and by batten's tension.
+Ways with a tolerance choose their knots themselves; those of batten have the wanted inflections too, and nobody
 else's do. Times are medians of several fits on one thread."""
 import argparse
 import csv

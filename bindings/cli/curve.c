@@ -76,7 +76,7 @@ static const cli_option table[] = {
     {"rounds-tol", OPT_ROUNDS_TOL, "T",
      "a round that lowers the sum of squares by a smaller part is the last; default 1e-3"},
     {"correction", OPT_CORRECTION, "N", "passes of parameter correction in a round, 0 keeps them; default 3"},
-    {"tension", OPT_TENSION, "W", "weight of stiffness beside the mean square distance; default 1e-12"},
+    {"tension", OPT_TENSION, "W", "weight of stiffness beside the mean square distance; default 1e-9"},
     {"margin", OPT_MARGIN, "M", "inequalities hold by this part of what the reference has; default 1e-3"},
     {"construction", OPT_CONSTRUCTION, "N",
      "of the reference: 1 (directions of legs) or 2 (removal of knots); default: the nearer"},

@@ -36,6 +36,7 @@
 #include <batten/contour.h>
 #include <batten/matrix.h>
 #include <batten/qp.h>
+#include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -111,9 +112,9 @@ typedef struct contour_knots_options {
 batten_status contour_knots_place(batten_context *ctx, const contour_data *data, const double *parameters,
                                   const contour_knots_options *opt, size_t *pieces, double **breaks);
 
-/* Up to `passes` steps of each point to a nearer place; parameters [count] stay in [0, 1] (closed: go round). The
- * first point at 0 and the last at 1 stay there (but closed). No distance rises. squares [count]: squared distances
- * from the new places. On the context's threads. */
+/* Up to `passes` steps of each point to a nearer place; parameters [count] stay in [0, 1]; the first point at 0 and
+ * the last at 1 stay there. closed: all go round. No distance rises. squares [count]: squared distances from the new
+ * places. On the context's threads. */
 void contour_correct(batten_context *ctx, const bspline *space, bool closed, const double *control,
                      const contour_data *data, unsigned passes, double *parameters, double *squares);
 
@@ -139,6 +140,13 @@ batten_status contour_space_make(batten_context *ctx, const contour_shape *shape
 void contour_space_free(batten_context *ctx, contour_space *s);
 /* control [b.count][2] of y. */
 void contour_space_expand(const contour_space *s, const double *y, double *control);
+
+/* The weight of the integral of |x''|^2 over [0, 1] for an option's tension: spans of length 1 / K have coefficients
+ * of K^3 there and of 1 / K in the mean square, which keep their ratio so. */
+static inline double contour_tension(double tension, size_t spans) { return tension * pow((double)spans, -4); }
+/* The default: what exact data of 500 random curves are off is within 1 % of what a hundredth of it leaves; with ten
+ * times it 4 % more. */
+#define CONTOUR_TENSION 1e-9
 
 /* ---- objective (objective.c) --------------------------------------------------------------------- */
 

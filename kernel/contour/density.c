@@ -16,7 +16,6 @@
 #include "base/checked.h"
 
 enum { TURN_SAMPLES = 8 };               /* of the pilot's tangent, per span */
-static const double TENSION = 1e-12;     /* the default of batten_contour_options: for unknowns without data */
 static const double NEED_PART = 2.0 / 3; /* of the breaks */
 static const double NEED_MOST = 16;      /* times the data's part: gaps and single jumps get no more */
 static const double NEED_LEAST = 0.1;    /* of its mean: straight pieces have breaks, too */
@@ -45,7 +44,7 @@ batten_status contour_least_fit(batten_context *ctx, const contour_data *data, c
   f.control = batten_alloc_array(ctx, f.space.b.count, 2 * sizeof(double));
   st = f.control ? contour_objective_new(ctx, &f.space.b, &o) : BATTEN_E_NOMEM;
   if (st < 0) goto done;
-  contour_objective_set(ctx, &o, data, parameters, TENSION);
+  contour_objective_set(ctx, &o, data, parameters, contour_tension(CONTOUR_TENSION, spans));
   st = contour_objective_solve(ctx, &o, &f.space, f.control);
   if (st < 0) goto done;
   *out = f;

@@ -29,6 +29,7 @@ typedef struct fit {
   contour_input in;
   contour_data data;
   contour_ends ends;
+  double tension; /* weight of the integral of |x''|^2 over [0, 1] */
   contour_layout layout;
   contour_space space, plain; /* with x'' = 0 at inflections, and without */
   contour_objective objective;
@@ -105,6 +106,7 @@ static batten_status begin(fit *f, size_t count, const double *points) {
   st = contour_layout_make(f->ctx, &f->data, &f->in, f->opt, &f->layout);
   if (st < 0) return st;
   const contour_shape *shape = &f->layout.shape;
+  f->tension = contour_tension(f->opt->tension, shape->spans);
   st = contour_space_make(f->ctx, shape, shape->degree, true, &f->ends, &f->space);
   if (st >= 0) st = contour_space_make(f->ctx, shape, shape->degree, false, &f->ends, &f->plain);
   if (st >= 0) st = contour_objective_new(f->ctx, &f->space.b, &f->objective);
@@ -145,7 +147,7 @@ static bool offer(fit *f, track *t, const double *control, const double *from) {
 
 /* The minimum in a space with points at parameters: f->free. */
 static batten_status solve_free(fit *f, const contour_space *space, const double *parameters) {
-  contour_objective_set(f->ctx, &f->objective, &f->data, parameters, f->opt->tension);
+  contour_objective_set(f->ctx, &f->objective, &f->data, parameters, f->tension);
   return contour_objective_solve(f->ctx, &f->objective, space, f->free);
 }
 
@@ -243,7 +245,7 @@ static batten_status find_reference(fit *f) {
   batten_status st = batten_progress(f->ctx, "reference", 0);
   if (st >= 0)
     st = contour_reference_find(f->ctx, &f->layout.shape, &f->space, &f->ends, &f->data, f->in.parameters,
-                                f->opt->construction, f->opt->tension, &f->row_options, &r);
+                                f->opt->construction, f->tension, &f->row_options, &r);
   f->info.time_reference_s = batten_now() - start;
   if (st < 0) return st;
   f->info.construction = r.construction;

@@ -18,7 +18,7 @@ batten_contour_options batten_contour_options_default(void) {
                                   .rounds = 10,
                                   .rounds_tol = 1e-3,
                                   .correction_passes = 3,
-                                  .tension = 1e-12,
+                                  .tension = CONTOUR_TENSION,
                                   .blend = 0.05,
                                   .margin = 1e-3,
                                   .gap = 0.1,

@@ -321,6 +321,74 @@ static void test_ends(batten_context *ctx) {
   contour_scene_free(&s);
 }
 
+/* Tension holds places without data, and takes nothing from the data that there are: however many spans. */
+static void test_tension(batten_context *ctx) {
+  enum { COUNT = 6000, SPANS = 1000 };
+  double *points = malloc(2 * COUNT * sizeof *points), *t = malloc(COUNT * sizeof *t), breaks[SPANS];
+  uint64_t seed = 3;
+  for (size_t i = 0; i < COUNT; i++) {
+    double r = 1 + 1e-3 * (t_uniform(&seed) - 0.5);
+    t[i] = (double)i / (COUNT - 1);
+    points[2 * i] = r * cos(3 * t[i]);
+    points[2 * i + 1] = r * sin(3 * t[i]);
+  }
+  for (size_t i = 0; i < SPANS; i++) breaks[i] = (double)(i + 1) / SPANS;
+  batten_contour_options o = batten_contour_options_default();
+  o.parameters = t;
+  o.breaks = breaks;
+  o.break_count = SPANS - 1;
+  o.inflection_count = 0;
+  o.rounds = 1;
+  o.correction_passes = 0;
+  result with = fit(ctx, COUNT, points, &o);
+  o.tension = 0;
+  result without = fit(ctx, COUNT, points, &o);
+  T_CHECK(with.status == BATTEN_OK && without.status == BATTEN_OK, "%d spans: %s, %s", SPANS,
+          batten_status_name(with.status), batten_status_name(without.status));
+  T_RATIO(fabs(with.info.lsq_unconstrained / without.info.lsq_unconstrained - 1), 1e-6,
+          "%d spans: tension adds to the sum of noise", SPANS);
+  batten_curve_free(with.curve);
+  batten_curve_free(without.curve);
+  size_t kept = 0; /* no data in half of the domain */
+  for (size_t i = 0; i < COUNT; i++) {
+    if (t[i] > 0.2 && t[i] < 0.7) continue;
+    t[kept] = t[i];
+    points[2 * kept] = cos(3 * t[i]);
+    points[2 * kept + 1] = sin(3 * t[i]);
+    kept++;
+  }
+  o.tension = batten_contour_options_default().tension;
+  with = fit(ctx, kept, points, &o);
+  T_CHECK(with.status == BATTEN_OK && with.info.shape.certified, "500 spans without data: %s",
+          batten_status_name(with.status));
+  T_RATIO(with.info.rms, 1e-6, "and the data are met");
+  batten_curve_free(with.curve);
+  free(points);
+  free(t);
+}
+
+/* Few points whose shape is not the wanted one: it is said, and the curve ends where they end. */
+static void test_few_points(batten_context *ctx) {
+  double points[2 * 15], parameters[15];
+  for (int i = 0; i < 15; i++) { /* bends to both sides, as the foremost frames of ships with a bulb do */
+    double t = i / 14.0;
+    points[2 * i] = 4 * t * t + 0.9 * sin(7 * t);
+    points[2 * i + 1] = 7 * t;
+  }
+  batten_contour_options o = batten_contour_options_default();
+  const double inflection = 0.25;
+  o.inflections = &inflection;
+  o.inflection_count = 1;
+  o.sign = 1;
+  batten_curve *curve = NULL;
+  batten_contour_info info;
+  batten_status st = batten_contour_fit(ctx, 15, points, &o, &curve, parameters, NULL, &info);
+  T_STATUS(st, BATTEN_W_SHAPE, ctx, "most near points[");
+  T_CHECK(info.shape.certified && info.max_error > 0.01 * 7, "proven, with points %g away", info.max_error);
+  T_CHECK(parameters[0] == 0 && parameters[14] == 1, "the ends stay: %g, %g", parameters[0], parameters[14]);
+  batten_curve_free(curve);
+}
+
 /* Few spans, closed: all that can be fitted is, the rest is told. */
 static void test_few_spans(batten_context *ctx) {
   const contour_rule rule = {.kind = CONTOUR_ELLIPSE, .count = 80, .seed = 3};
@@ -359,6 +427,8 @@ int main(void) {
   test_domain(ctx);
   test_threads();
   test_ends(ctx);
+  test_tension(ctx);
+  test_few_points(ctx);
   test_few_spans(ctx);
   batten_context_free(ctx);
   return t_done();

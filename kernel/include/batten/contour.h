@@ -70,8 +70,9 @@ typedef struct batten_contour_options {
   unsigned correction_passes; /* of parameter correction (nearest places) in each round, 0 = parameters stay. The
                                  first and last points of open curves stay at the ends of the domain, where they are
                                  there: else the curve might run on beyond them. Default 3. */
-  double tension; /* weight of the integral of |x''|^2 beside the mean square distance, domain [0, 1], >= 0. What
-                     keeps places without data calm. Default 1e-12. */
+  double tension; /* weight of K^-4 integral of |x''|^2 beside the mean square distance, domain [0, 1], K spans, >= 0:
+                     as stiff beside the data of a span however many spans there are. What keeps places without data
+                     calm. Default 1e-9. */
 
   /* The inequalities. */
   unsigned construction; /* of the first reference: 1 prescribed directions of legs, 2 knot removal, 0 = both, and the
