@@ -199,8 +199,9 @@ static int ascending(const void *a, const void *b) {
   return (x > y) - (x < y);
 }
 
-/* Many curves are drawn without what surrounds them: nobody could tell it apart. */
-static bool has_surroundings(const drawing *d) { return d->w->count <= 6; }
+/* Several curves are drawn without control polygons, and many without combs: nobody could tell them apart. */
+static bool has_polygons(const drawing *d) { return d->w->count <= 6; }
+static bool has_combs(const drawing *d) { return d->w->count <= 16; }
 
 /* Nineteen of twenty quills of the results are shorter than an eighth of the picture, of several less; none is longer
  * than two and a half of that. */
@@ -241,8 +242,8 @@ static batten_status gather_side(batten_context *ctx, drawing *d, int which) {
     }
     if (st >= 0) st = add_polyline(ctx, curve, d->size / 4000, &s->curve);
     if (st >= 0) st = add_inflections(ctx, curve, &s->inflections);
-    if (st >= 0 && has_surroundings(d)) st = add_polygon(ctx, curve, &s->polygon);
-    if (st >= 0 && has_surroundings(d)) st = add_comb(ctx, curve, length, quills_of(d, length), d->scale, d->most, s);
+    if (st >= 0 && has_polygons(d)) st = add_polygon(ctx, curve, &s->polygon);
+    if (st >= 0 && has_combs(d)) st = add_comb(ctx, curve, length, quills_of(d, length), d->scale, d->most, s);
     if (st >= 0 && d->w->count == 1) st = add_curvature(ctx, curve, &s->curvature);
   }
   return st;
@@ -296,16 +297,17 @@ static unsigned needed_height(const drawing *d, unsigned width) {
 /* In thousandths of the picture: crosses of neighbours hardly touch, where the curve takes half of the picture. */
 static double cross_radius(const drawing *d) {
   double spacing = d->size > 0 ? 450 * d->length / d->size / (double)d->data.count : 0;
-  return fmax(1.6, fmin(has_surroundings(d) ? 4 : 2.2, 0.35 * spacing));
+  return fmax(1.6, fmin(has_polygons(d) ? 4 : 2.2, 0.35 * spacing));
 }
 
 static void shape_plot(const drawing *d, int which, batten_plot_layer *layers, batten_plot *plot,
                        char caption[CAPTION]) {
   const side *s = &d->sides[which];
   const curve_work *w = d->w;
-  bool few = w->count == 1 && s->polygon.count <= 60, named = which == 1, all = has_surroundings(d);
-  layers[0] = layer(BATTEN_PLOT_LINE, &s->quills, 0xcfdbe9, 0.9, NULL);
-  layers[1] = layer(BATTEN_PLOT_LINE, &s->envelope, 0x8fabcb, 1.3, named && all ? "curvature" : NULL);
+  bool few = w->count == 1 && s->polygon.count <= 60, named = which == 1, all = has_polygons(d);
+  layers[0] = layer(BATTEN_PLOT_LINE, &s->quills, all ? 0xcfdbe9 : 0xafc3da, 0.9, NULL);
+  layers[1] = layer(BATTEN_PLOT_LINE, &s->envelope, 0x8fabcb, all ? 1.3 : 0.9,
+                    named && s->envelope.count ? "curvature" : NULL);
   layers[2] = layer(BATTEN_PLOT_CROSSES, &d->data, 0xc8442c, cross_radius(d), named ? "data" : NULL);
   layers[3] = layer(BATTEN_PLOT_LINE, &s->polygon, 0xa0a0a0, 1.2, named && all ? "control polygon" : NULL);
   layers[4] = layer(BATTEN_PLOT_DOTS, &s->polygon, 0x808080, few ? 3.2 : 1.8, NULL);
