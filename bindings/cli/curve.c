@@ -58,7 +58,7 @@ static const cli_option table[] = {
      "or an edited --proposal; default auto"},
     {"sign", OPT_SIGN, "SIDE", "to which the curve turns at its start: auto, left or right; default auto"},
     {"significance", OPT_SIGNIFICANCE, "S",
-     "with auto: standard deviations of noise that a bend must have to count; default 5"},
+     "with auto: standard deviations of noise that a bend must have to count; default 4"},
     {"knots", OPT_KNOTS, "WHAT",
      "auto, the number N of polynomial pieces, or a FILE of inner knots; inflections become\nknots too; default "
      "auto"},

@@ -7,9 +7,9 @@
  * neighbours, until all that are left are significant [backward elimination]. So straight pieces, the ringing of a
  * smooth curve beside a corner, and wiggles do not count, and a weak but long bend does.
  *
- * Runs that noise explains many times over join first, without fits: where curvature is less than its standard
- * deviation. An inflection lies where the sign is as likely the one before as the one after: in a straight piece that
- * is its middle. */
+ * Runs join first, without fits, that parabolas of their turn and length show to be less than the noise. (Their
+ * curvature beside its standard deviation would not do: long weak bends are below it everywhere.) An inflection lies
+ * where the sign is as likely the one before as the one after: in a straight piece that is its middle. */
 #include "bends.h"
 
 #include <string.h>
@@ -21,7 +21,7 @@
 static const double NO_SIGN = 1e-3;
 /* The sign of curvature is certain from here on, in its standard deviations. */
 static const double CERTAIN = 2;
-/* Runs whose curvature squared, in variances and summed over bandwidths, is less than this join without a fit. */
+/* Runs that a parabola shows to be so few standard deviations join without a fit. */
 static const double NOISE_ALONE = 1;
 /* Between two inflections, and beyond the last one, lie so many points, or nothing speaks for a run. */
 enum { POINTS_MIN = 2 };
@@ -91,9 +91,8 @@ typedef struct group {
   double from, to;
   size_t peak; /* sample of greatest curvature of its sign, in standard deviations */
   int sign;
-  double energy;       /* of its sign, less that of joined runs of the other sign */
-  double significance; /* NaN: not known */
-  bool joined;         /* to another one: no more there */
+  double parabola, significance; /* NaN: not known */
+  bool joined;                   /* to another one: no more there */
 } group;
 static const size_t NONE = (size_t)-1;
 
@@ -149,6 +148,14 @@ static double angle_at(const search *s, double t) {
   return add + s->plot->angles[i] + (at - (double)i) * (s->plot->angles[i + 1] - s->plot->angles[i]);
 }
 
+static double length_at(const search *s, double t) {
+  const size_t steps = s->plot->count - 1;
+  const double *samples = s->plot->samples;
+  double add = t > 1 ? samples[4 * steps + 3] : 0, at = (t > 1 ? t - 1 : t) * (double)steps;
+  size_t i = at < (double)steps ? (size_t)at : steps - 1;
+  return add + samples[4 * i + 3] + (at - (double)i) * (samples[4 * i + 7] - samples[4 * i + 3]);
+}
+
 /* Changes of sign in the plot: how many, and where (changes NULL: only how many). *first: the sign before. */
 static size_t find_changes(const search *s, double *changes, int *first) {
   size_t count = 0, last = 0;
@@ -168,24 +175,20 @@ static size_t find_changes(const search *s, double *changes, int *first) {
   return count;
 }
 
-/* Sums over samples of a run, and its peak. */
-static void measure_run(search *s, size_t i) {
-  const batten_contour_run *r = &s->runs[i];
-  group *g = &s->groups[i];
-  size_t steps = s->plot->count - 1;
-  double part = 1 / ((double)steps * s->smooth->bandwidth), best = -1;
+/* The sample where the run bends most, in standard deviations. */
+static size_t find_peak(const search *s, const batten_contour_run *r) {
+  const size_t steps = s->plot->count - 1;
   size_t from = (size_t)ceil(r->from * (double)steps), to = (size_t)floor(r->to * (double)steps);
-  g->peak = (size_t)(0.5 * (r->from + r->to) * (double)steps) % steps;
+  size_t peak = (size_t)(0.5 * (r->from + r->to) * (double)steps) % steps;
+  double best = -1;
   for (size_t k = from; k <= to; k++) {
     size_t sample = k > steps ? k - steps : k;
     double z = value(s, sample) * r->sign;
-    if (z < 0) continue;
-    g->energy += part * z * z;
-    if (z > best) {
-      best = z;
-      g->peak = sample;
-    }
+    if (z <= best) continue;
+    best = z;
+    peak = sample;
   }
+  return peak;
 }
 
 static batten_status find_runs(batten_context *ctx, search *s) {
@@ -220,8 +223,9 @@ static batten_status find_runs(batten_context *ctx, search *s) {
                            .from = r.from,
                            .to = r.to,
                            .sign = r.sign,
+                           .peak = find_peak(s, &r),
+                           .parabola = NAN,
                            .significance = NAN};
-    measure_run(s, i);
   }
   if (closed && changes) {
     s->groups[0].before = s->count - 1;
@@ -237,7 +241,6 @@ static size_t join(search *s, size_t i) {
   size_t before = g[i].before, after = g[i].after, to = before != NONE ? before : after;
   group *keep = &g[to];
   g[i].joined = true;
-  keep->energy = fmax(keep->energy - g[i].energy, 0);
   s->left--;
   if (before == NONE) {
     keep->from = g[i].from;
@@ -255,7 +258,6 @@ static size_t join(search *s, size_t i) {
     s->left--;
     keep->to = other->to > keep->from ? other->to : other->to + 1;
     keep->after = other->after;
-    keep->energy += other->energy;
     if (fabs(value(s, other->peak)) > fabs(value(s, keep->peak))) keep->peak = other->peak;
     if (keep->after != NONE) g[keep->after].before = to;
   }
@@ -269,13 +271,36 @@ static size_t first_group(const search *s) {
   return i;
 }
 
+/* Points with parameters in [from, to], to maybe beyond 1; no more than `most`. */
+static size_t count_points(const search *s, double from, double to, size_t most) {
+  size_t count = 0;
+  for (size_t i = 0; i < s->points && count < most; i++) {
+    double t = s->parameters[i];
+    count += (t >= from && t <= to) || t + 1 <= to;
+  }
+  return count;
+}
+
+/* About the significance of a group if it bent evenly and became straight: m points on a parabola of length l that
+ * turns by a are off their line by (a l)^2 / 720 in the mean square. That is more than the fit can tell, whose
+ * neighbouring runs give way. */
+static double parabola(const search *s, const group *g) {
+  double turn = fmax((angle_at(s, g->to) - angle_at(s, g->from)) * g->sign, 0);
+  double length = length_at(s, g->to) - length_at(s, g->from);
+  return turn * length * sqrt((double)count_points(s, g->from, g->to, s->points) / 720) / s->noise;
+}
+
 static void join_noise(search *s) {
   while (s->left > 1) {
     size_t least = NONE;
-    for (size_t i = 0; i < s->count; i++)
-      if (!s->groups[i].joined && (least == NONE || s->groups[i].energy < s->groups[least].energy)) least = i;
-    if (s->groups[least].energy >= NOISE_ALONE) return;
-    join(s, least);
+    for (size_t i = 0; i < s->count; i++) {
+      group *g = &s->groups[i];
+      if (g->joined) continue;
+      if (isnan(g->parabola)) g->parabola = parabola(s, g);
+      if (least == NONE || g->parabola < s->groups[least].parabola) least = i;
+    }
+    if (s->groups[least].parabola >= NOISE_ALONE) return;
+    s->groups[join(s, least)].parabola = NAN;
   }
 }
 
@@ -338,25 +363,19 @@ static double cost(search *s, size_t i, bool turned) {
   return contour_forced_solve(&s->forced, NULL);
 }
 
-/* Points with parameters in [from, to], to maybe beyond 1. */
-static size_t count_points(const search *s, double from, double to) {
-  size_t count = 0;
-  for (size_t i = 0; i < s->points && count < POINTS_MIN; i++) {
-    double t = s->parameters[i];
-    count += (t >= from && t <= to) || t + 1 <= to;
-  }
-  return count;
-}
-
 static batten_status find_significances(batten_context *ctx, search *s) {
   for (size_t i = 0; i < s->count; i++) {
     group *g = &s->groups[i];
     if (g->joined || !isnan(g->significance)) continue;
     batten_status st = batten_progress(ctx, "inflections", 0.5);
     if (st < 0) return st;
+    if (s->left == 1) { /* what is left may be the weaker sign's group */
+      double turn = angle_at(s, 1) - angle_at(s, 0);
+      if (turn * g->sign < 0) g->sign = -g->sign;
+    }
     double rise = cost(s, i, true) - cost(s, i, false);
     g->significance = rise > 0 ? sqrt(rise) / s->noise : 0;
-    if (s->left > 1 && count_points(s, g->from, g->to) < POINTS_MIN) g->significance = 0;
+    if (s->left > 1 && count_points(s, g->from, g->to, POINTS_MIN) < POINTS_MIN) g->significance = 0;
   }
   return BATTEN_OK;
 }

@@ -14,6 +14,7 @@
 #include <string.h>
 
 #include "base/checked.h"
+#include "deviations.h"
 
 enum { TURN_SAMPLES = 8 };               /* of the pilot's tangent, per span */
 static const double NEED_PART = 2.0 / 3; /* of the breaks */
@@ -146,6 +147,15 @@ static void measure_floor(const contour_data *data, contour_density *d) {
       squares += weight_of(data, i) * e * e;
     }
   d->floor = FLOOR * sqrt(squares / total);
+}
+
+/* What neighbours deviate alike by is no structure either. */
+static batten_status raise_floor(batten_context *ctx, const contour_data *data, const double *parameters, bool closed,
+                                 contour_density *d) {
+  contour_deviations deviations;
+  batten_status st = contour_deviations_find(ctx, data, parameters, closed, &deviations);
+  if (st >= 0) d->floor = fmax(d->floor, deviations.correlated);
+  return st;
 }
 
 /* ---- the pilot ----------------------------------------------------------------------------------- */
@@ -288,6 +298,8 @@ batten_status contour_density_make(batten_context *ctx, const contour_data *data
   if (st < 0) goto done;
   make_cells(data, parameters, closed, &d);
   measure_floor(data, &d);
+  st = raise_floor(ctx, data, parameters, closed, &d);
+  if (st < 0) goto done;
   memcpy(d.need, d.data, d.cells * sizeof *d.need);
   st = find_pilot(ctx, data, parameters, degree, closed, &d);
   if (st >= 0 && d.pilot.spans > 0) st = find_need(ctx, closed, &d);

@@ -38,7 +38,8 @@ typedef struct contour_density {
   double *need;  /* [cells] part of what the curve needs */
   double *sum;   /* [cells + 1] of their blend, from 0 to 1 */
   size_t places; /* different parameters of points that have weight */
-  double floor;  /* distances below which structure does not count: a part of the data's size */
+  double floor;  /* distances below which structure does not count: a part of the data's size, and what neighbours
+                    deviate alike by */
   contour_least pilot;
 } contour_density;
 

@@ -15,6 +15,7 @@
 #include <string.h>
 
 #include "base/checked.h"
+#include "deviations.h"
 #include "sparse/band.h"
 
 /* The weight of |x''|^2 beside |x'''|^2: makes the sum definite where points have only two parameters. */
@@ -22,6 +23,10 @@ static const double BENDING = 1e-6;
 /* The bandwidth is between these multiples of a span when spans are as they should be, and looked for in .. */
 static const double SHORT = 3, LONG = 9;
 static const double SHORTEST = 0.25, LONGEST = 24;
+/* The noise that is left lies between these multiples of what neighbours tell of it. */
+static const double LOOSE = 2.4, TIGHT = 0.85;
+/* The bandwidth becomes shorter by such steps of log 2, until it does. */
+static const double FINER = 0.5;
 enum { SPANS_MIN = 16, SPANS_FIRST = 128, SPANS_MAX = 2048, STEPS = 14 };
 
 /* Of uniform B-splines of a degree the values on the span where they are not 0, by their recursion. */
@@ -177,26 +182,6 @@ static double solve(contour_smooth *s, double bandwidth) {
   return 2 * freedom * log(least) + 2 * determinant - 2 * ((double)n - free_functions(s)) * log(s->lambda);
 }
 
-/* The likeliest bandwidth within what these spans can tell, and its solution. */
-static bool choose_bandwidth(contour_smooth *s) {
-  double h = 1 / (double)s->spans, logs[STEPS], values[STEPS];
-  double first = log2(SHORTEST * h), last = log2(fmin(LONGEST * h, 1));
-  size_t best = 0;
-  for (size_t i = 0; i < STEPS; i++) {
-    logs[i] = first + (last - first) * (double)i / (STEPS - 1);
-    values[i] = solve(s, exp2(logs[i]));
-    /* <=: of equally likely ones, as exact data have them, the smoothest */
-    if (values[i] <= values[best]) best = i;
-  }
-  double at = logs[best];
-  if (best > 0 && best + 1 < STEPS) {
-    double left = values[best - 1] - values[best], right = values[best + 1] - values[best];
-    if (left + right > 0 && left + right < INFINITY)
-      at += 0.5 * (logs[best + 1] - logs[best]) * (left - right) / (left + right);
-  }
-  return solve(s, exp2(at)) < INFINITY;
-}
-
 /* The inverse within the band, from the last column back: Z = L^-T L^-1 satisfies L' Z = L^-1, which is 0 above the
  * diagonal.   [Takahashi, Fagan, Chin 1973] */
 static void invert(contour_smooth *s) {
@@ -242,6 +227,50 @@ static void find_noise(contour_smooth *s, const contour_data *data, const double
   s->noise = sqrt(squares / left);
 }
 
+/* Shorter bandwidths, from log 2 at, until the fit leaves no more than neighbours tell of noise. */
+static bool follow_data(contour_smooth *s, const contour_data *data, const double *parameters, double local,
+                        double first, double at) {
+  const double most = fmax(LOOSE * local, CONTOUR_EXACT * s->size);
+  if (!(solve(s, exp2(at)) < INFINITY)) return false;
+  for (;;) {
+    invert(s);
+    find_noise(s, data, parameters);
+    if (!(s->noise > most) || at - FINER < first) return true;
+    if (!(solve(s, exp2(at - FINER)) < INFINITY)) break;
+    at -= FINER;
+  }
+  /* too short for the numbers: the last one that was not */
+  if (!(solve(s, exp2(at)) < INFINITY)) return false;
+  invert(s);
+  find_noise(s, data, parameters);
+  return true;
+}
+
+/* The likeliest bandwidth within what these spans can tell, and its solution. One for the whole curve is too long
+ * where it bends sharply at a place: then the likelihood takes that place for noise, and neighbours know better. It
+ * is no shorter than half of what neighbours deviate alike over, since that is not the curve's. */
+static bool choose_bandwidth(contour_smooth *s, const contour_data *data, const double *parameters,
+                             const contour_deviations *deviations) {
+  double h = 1 / (double)s->spans, logs[STEPS], values[STEPS];
+  double first = log2(SHORTEST * h), last = log2(fmin(LONGEST * h, 1));
+  size_t best = 0;
+  for (size_t i = 0; i < STEPS; i++) {
+    logs[i] = first + (last - first) * (double)i / (STEPS - 1);
+    values[i] = solve(s, exp2(logs[i]));
+    /* <=: of equally likely ones, as exact data have them, the smoothest */
+    if (values[i] <= values[best]) best = i;
+  }
+  double at = logs[best];
+  if (best > 0 && best + 1 < STEPS) {
+    double left = values[best - 1] - values[best], right = values[best + 1] - values[best];
+    if (left + right > 0 && left + right < INFINITY)
+      at += 0.5 * (logs[best + 1] - logs[best]) * (left - right) / (left + right);
+  }
+  if (deviations->correlated > 0) at = fmax(at, fmin(log2(0.5 * (double)deviations->reach / s->count), last));
+  double local = deviations->correlated > 0 || isnan(deviations->local) ? INFINITY : deviations->local;
+  return follow_data(s, data, parameters, local, first, at);
+}
+
 static batten_status level_new(batten_context *ctx, bool closed, size_t spans, contour_smooth *s) {
   *s = (contour_smooth){.closed = closed, .spans = spans};
   s->functions = closed ? spans : spans + SMOOTH_DEGREE;
@@ -269,12 +298,15 @@ void contour_smooth_free(batten_context *ctx, contour_smooth *s) {
 batten_status contour_smooth_fit(batten_context *ctx, const contour_data *data, const double *parameters, bool closed,
                                  contour_smooth *out) {
   contour_smooth s = {0};
+  contour_deviations deviations;
+  batten_status st = contour_deviations_find(ctx, data, parameters, closed, &deviations);
+  if (st < 0) return st;
   size_t most = SPANS_MIN, spans;
   int way = 0; /* +1 once spans were doubled, -1 once halved: not back again */
   while (most < SPANS_MAX && most < 2 * data->count) most *= 2;
   spans = most < SPANS_FIRST ? most : SPANS_FIRST;
   for (;;) {
-    batten_status st = batten_progress(ctx, "inflections", 0);
+    st = batten_progress(ctx, "inflections", 0);
     if (st >= 0) st = level_new(ctx, closed, spans, &s);
     if (st < 0) {
       contour_smooth_free(ctx, &s);
@@ -282,7 +314,7 @@ batten_status contour_smooth_fit(batten_context *ctx, const contour_data *data, 
     }
     fill_penalty(&s);
     fill_gram(&s, data, parameters);
-    bool solved = choose_bandwidth(&s);
+    bool solved = choose_bandwidth(&s, data, parameters, &deviations);
     double relative = s.bandwidth * (double)spans;
     bool finer = solved && relative < SHORT && spans < most && way >= 0;
     bool coarser = (!solved || relative > LONG) && spans > SPANS_MIN && way <= 0;
@@ -295,8 +327,8 @@ batten_status contour_smooth_fit(batten_context *ctx, const contour_data *data, 
     way = finer ? 1 : -1;
     contour_smooth_free(ctx, &s);
   }
-  invert(&s);
-  find_noise(&s, data, parameters);
+  /* fmax: local may be NaN */
+  s.noise = fmax(s.noise, fmax(TIGHT * deviations.local, deviations.correlated));
   *out = s;
   return BATTEN_OK;
 }

@@ -170,7 +170,12 @@ typedef struct batten_contour_proposal {
   batten_curve *smoothed; /* the smoothing spline */
 } batten_contour_proposal;
 
-/* Smooths the points, and tells bends from noise. Uses of opt: closed, parameters, parametrization, domain, weights,
+/* Smooths the points, and tells bends from noise. What is taken for noise: what the smoothing spline leaves, between
+ * 0.85 and 2.4 times what neighbouring points tell (the distances of points across the cubics through two neighbours on
+ * both sides); and where those distances grow slowly with the neighbours' steps, as in outlines that were drawn by
+ * hand or follow pixels, the distance across neighbours four points away: neighbours deviate alike there, and bends
+ * of a few points do not count. No less than 1e-4 of the points' size up to 100 points; with their number's root
+ * for more. Uses of opt: closed, parameters, parametrization, domain, weights,
  * significance. Free with batten_contour_proposal_free. Progress phase "inflections". Fails: as batten_contour_fit.
  */
 BATTEN_API batten_status batten_contour_propose(batten_context *ctx, size_t count, const double *points,
