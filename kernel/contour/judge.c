@@ -92,9 +92,9 @@ static void find_worst(const contour_data *data, const double *squares, const do
 }
 
 /* Whether squares whose mean is `result` rise above those without inequalities, of mean `free` that leaves `left` of
- * `count` points, by what is seen and no chance. */
-static bool surely_above(double result, double free, double count, double left, double size) {
-  double bound = count - left, noise = fmax(free * count / left, EVEN * EVEN * size * size);
+ * `count` points, by what is seen and no chance. noise: its square. */
+static bool surely_above(double result, double free, double noise, double count, double left, double size) {
+  double bound = count - left;
   if (left < 1 || bound <= 0 || result < MISFIT_SURE * MISFIT_SURE * noise) return false;
   if (result - free < SEEN * SEEN * size * size) return false;
   double root = cbrt((result - free) * count / bound / noise), a = 2 / (9 * bound), b = 2 / (9 * left);
@@ -120,6 +120,8 @@ void contour_judge(const contour_data *data, const double *squares, const double
   double scale = noise > 0 ? noise * noise : 0;
   find_worst(data, squares, unconstrained_squares, MISFIT, fmax(scale, EVEN * EVEN * size * size), out);
   if (isnan(noise)) return;
-  out->misfit = rms / fmax(noise, EVEN * size);
-  out->contradicts = out->misfit > MISFIT || surely_above(result / total, free / total, count, left, size);
+  noise = fmax(noise, EVEN * size);
+  out->misfit = rms / noise;
+  out->contradicts =
+      out->misfit > MISFIT || surely_above(result / total, free / total, noise * noise, count, left, size);
 }

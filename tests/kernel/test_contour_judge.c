@@ -85,6 +85,10 @@ int main(void) {
   contour_judge(&data, squares, unconstrained, 2 * COUNT, &v);
   T_CHECK(!v.contradicts, "rough points that it goes through: %g", v.misfit);
   test_few();
+  fill(1e-2, 1e-8);
+  for (size_t i = 0; i < COUNT; i++) points[i][1] += 0.02 * (t_uniform(&state) - 0.5);
+  contour_judge(&data, squares, unconstrained, 2 * COUNT - 4, &v);
+  T_CHECK(!v.contradicts, "and where two of them are left: %g", v.misfit);
   data.count = 3;
   contour_judge(&data, squares, unconstrained, 8, &v);
   T_CHECK(isnan(v.misfit) && !v.contradicts, "three points tell nothing: %g", v.misfit);
