@@ -69,6 +69,8 @@ void curve_net_at(unsigned degree, const double (*net)[2], double u, double out[
 /* Bernstein coefficients c [n + 1][dim] become those over [from, to], 0 <= from < to: towards one end of the whole,
  * and of that towards the other end. */
 void curve_restrict(unsigned n, unsigned dim, double from, double to, double *c);
+/* Whether Bezier points [n + 1][2] of x' tell that it comes nowhere near 0. */
+bool curve_is_steady(unsigned n, const double (*net)[2]);
 
 /* What is integrated by u: the first number is the speed |x'|, all [CURVE_INTEGRALS]. */
 enum { CURVE_INTEGRALS = 3, CURVE_DEPTH = 44 };

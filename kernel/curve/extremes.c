@@ -246,16 +246,40 @@ static void make_slope(const curve_piece *piece, const rows *r, polynomial *p) {
   p->noise = 8 * DBL_EPSILON * first * first * second * ((n > 1 ? 2 * (n - 1) * first : 0) + 3 * second);
 }
 
+/* The whole piece, halved where x' is not steady: parts have a noise of their own, which hides less where x' is small
+ * beside what it is elsewhere. */
 static void search_piece(extremes *e, const curve_piece *piece, size_t mu) {
-  rows r;
-  polynomial p;
-  root_walk walk = {0};
-  double root;
+  enum { HALVINGS = 24 };
   if (piece->degree < 2) return; /* straight */
-  make_rows(piece, &r);
-  if (!may_exceed(e, piece, &r)) return;
-  make_slope(piece, &r, &p);
-  while (next_root(&p, &walk, &root)) try_place(e, piece, mu, root);
+  unsigned n = piece->degree - 1, depth = 0;
+  double index = 0; /* the part [index, index + 1] / 2^depth is the next */
+  for (;;) {
+    double width = ldexp(1, -(int)depth), from = index * width, root;
+    curve_piece part = *piece;
+    rows r;
+    curve_restrict(n, 2, from, from + width, part.first[0]);
+    curve_restrict(n - 1, 2, from, from + width, part.second[0]);
+    for (unsigned i = 0; i <= n; i++)
+      for (int x = 0; x < 2; x++) {
+        part.first[i][x] *= width;
+        part.second[i][x] *= width * width;
+      }
+    make_rows(&part, &r);
+    if (may_exceed(e, &part, &r)) {
+      if (depth < HALVINGS && !curve_is_steady(n, (const double(*)[2])part.first)) {
+        depth++;
+        index *= 2;
+        continue;
+      }
+      polynomial p;
+      root_walk walk = {0};
+      make_slope(&part, &r, &p);
+      while (next_root(&p, &walk, &root)) try_place(e, piece, mu, from + root * width);
+    }
+    index += 1;
+    for (; depth > 0 && fmod(index, 2) == 0; depth--) index *= 0.5;
+    if (depth == 0) return;
+  }
 }
 
 void curve_find_curvatures(const batten_curve *curve, double value[2], double at[2]) {

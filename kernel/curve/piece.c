@@ -96,7 +96,7 @@ void curve_restrict(unsigned n, unsigned dim, double from, double to, double *c)
  * differs, and the more there are the less is asked. */
 enum { LEAVES = 200, LEAVES_PER_BIT = 4 };
 static const double SAME = 1e-13;
-/* On such a part x' goes one way everywhere, by at least so much of its largest size. */
+/* Where x' is steady it goes one way everywhere, by at least so much of its largest size. */
 static const double STEADY = 0.1;
 
 void curve_speed(const curve_piece *piece, double u, double *out) {
@@ -137,13 +137,8 @@ void curve_walk_start(curve_walk *walk, const curve_piece *piece, curve_integran
   integrate(piece, integrand, from, to, walk->stack[0].whole);
 }
 
-/* Whether x' comes nowhere near 0 on a part: what it does in a place narrower than the rule's nodes are apart, the
- * halves may miss as the whole does. */
-static bool is_steady(const curve_piece *piece, double from, double to) {
-  unsigned n = piece->degree - 1;
-  double net[BSPLINE_ORDER][2], sum[2] = {0, 0}, least = INFINITY, most = 0;
-  memcpy(net, piece->first, (n + 1) * sizeof *net);
-  curve_restrict(n, 2, from, to, net[0]);
+bool curve_is_steady(unsigned n, const double (*net)[2]) {
+  double sum[2] = {0, 0}, least = INFINITY, most = 0;
   for (unsigned i = 0; i <= n; i++)
     for (int x = 0; x < 2; x++) sum[x] += net[i][x];
   for (unsigned i = 0; i <= n; i++) {
@@ -151,6 +146,15 @@ static bool is_steady(const curve_piece *piece, double from, double to) {
     most = fmax(most, hypot(net[i][0], net[i][1]));
   }
   return least >= STEADY * most * hypot(sum[0], sum[1]);
+}
+
+/* What x' does in a place narrower than the rule's nodes are apart, the halves may miss as the whole does. */
+static bool is_steady(const curve_piece *piece, double from, double to) {
+  unsigned n = piece->degree - 1;
+  double net[BSPLINE_ORDER][2];
+  memcpy(net, piece->first, (n + 1) * sizeof *net);
+  curve_restrict(n, 2, from, to, net[0]);
+  return curve_is_steady(n, (const double(*)[2])net);
 }
 
 bool curve_walk_next(curve_walk *walk, double *from, double *to, double integrals[CURVE_INTEGRALS]) {

@@ -196,6 +196,20 @@ static void test_random(batten_context *ctx) {
 
 /* ---- invariances --------------------------------------------------------------------------------- */
 
+/* Of one span; the speed varies by 10^5. */
+static const curve_case uneven = {.degree = 8,
+                                  .knot_count = 18,
+                                  .knots = {0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1},
+                                  .control = {{0, 0},
+                                              {2e-05, 0},
+                                              {3e-05, 1e-05},
+                                              {-0.00011, -0.00132},
+                                              {-0.00022, -0.00171},
+                                              {-0.00022, -0.00174},
+                                              {2.05637, 5.23775},
+                                              {2.05637, 5.23659},
+                                              {2.0382, 5.25809}}};
+
 /* Closed curves of one span: x' has no mean direction. */
 static void test_one_span(batten_context *ctx) {
   enum { PLACES = 501 };
@@ -205,7 +219,7 @@ static void test_one_span(batten_context *ctx) {
   size_t missed = 0;
   for (int i = 0; i < PLACES; i++) places[i] = i / (PLACES - 1.0);
   for (unsigned i = 0; i < 40; i++) {
-    curve_case c = curve_case_random(&state, 3 + i % 7, 0, 1, 1, 0, 1);
+    curve_case c = i ? curve_case_random(&state, 3 + i % 7, 0, 1, 1, 0, 1) : uneven;
     batten_curve *curve = curve_case_make(ctx, &c);
     batten_curve_measures m = {.curvature_max = NAN};
     if (batten_curve_measure(ctx, curve, &m) < 0 || batten_curve_evaluate(ctx, curve, PLACES, places, points) < 0)
@@ -217,7 +231,7 @@ static void test_one_span(batten_context *ctx) {
     }
     batten_curve_free(curve);
   }
-  T_CHECK(missed == 0, "closed curves of one span: %zu places bend more than is said", missed);
+  T_CHECK(missed == 0, "curves of one span: %zu places bend more than is said", missed);
 }
 
 static void test_moved(batten_context *ctx) {

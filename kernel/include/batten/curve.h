@@ -94,7 +94,9 @@ typedef struct batten_curve_measures {
   double area;                         /* closed curves: positive when it runs counter-clockwise; of others 0 */
   double centroid[2];                  /* of the line itself */
   double lower[2], upper[2];           /* box, to 1e-12 of its size */
-  double curvature_min, curvature_max; /* over both sides of knots; NaN, as are the places, without a tangent */
+  double curvature_min, curvature_max; /* over both sides of knots; NaN, as are the places, without a tangent
+                                          anywhere. Where x' vanishes the curvature may be unbounded: that is
+                                          not seen */
   double curvature_min_at, curvature_max_at;
   double turn;        /* of the tangent from start to end, radians: a circle has 2 pi; corners at knots count
                          as turns by less than pi */
