@@ -23,6 +23,8 @@ static const double NO_SIGN = 1e-3;
 static const double CERTAIN = 2;
 /* Runs that a parabola shows to be so few standard deviations join without a fit. */
 static const double NOISE_ALONE = 1;
+/* Roughness counts no less than this part of what it does in the smoothing. */
+static const double ROUGH_LEAST = 0.1;
 /* Between two inflections, and beyond the last one, lie so many points, or nothing speaks for a run. */
 enum { POINTS_MIN = 2 };
 enum { PER_SPAN = 4, BISECTIONS = 40, PLACES = 64 }; /* PER_SPAN: samples of the plot */
@@ -474,6 +476,16 @@ void contour_bends_free(batten_context *ctx, contour_bends *b) {
   *b = (contour_bends){0};
 }
 
+/* By what lambda grows for weighing runs. It is the square of the noise over what is expected of the third derivative:
+ * where more noise is taken for granted than the fit had, the rise of the sum is that of this larger lambda. But few
+ * exact points leave a curve free between them, where the smoothing spline rings beside a sharp bend; without the
+ * ringing the curve is rougher, and nothing else: the fewer they are, the less does that count. */
+static double rougher(const search *s) {
+  double more = s->noise / fmax(s->smooth->fitted, CONTOUR_EXACT * s->smooth->size);
+  double many = s->smooth->count / CONTOUR_EVEN_COUNT;
+  return more <= 1 ? 1 : fmin(more * more, fmax(many * many, ROUGH_LEAST));
+}
+
 batten_status contour_bends_find(batten_context *ctx, const contour_smooth *smooth, const contour_plot *plot,
                                  size_t points, const double *parameters, double significance, contour_bends *out) {
   search s = {.smooth = smooth, .plot = plot, .points = points, .parameters = parameters};
@@ -482,10 +494,7 @@ batten_status contour_bends_find(batten_context *ctx, const contour_smooth *smoo
   batten_status st = find_runs(ctx, &s);
   if (st >= 0) {
     join_noise(&s);
-    /* lambda is the square of the noise over what is expected of the third derivative: where more noise is taken for
-     * granted than the data have, the rise of the sum is that of this larger lambda. */
-    double more = s.noise / fmax(smooth->noise, CONTOUR_EXACT * smooth->size);
-    st = contour_forced_new(ctx, smooth, smooth->lambda * fmax(1, more * more), &s.forced);
+    st = contour_forced_new(ctx, smooth, smooth->lambda * rougher(&s), &s.forced);
   }
   if (st >= 0) st = join_insignificant(ctx, &s, significance);
   if (st >= 0 && s.left > 1) {

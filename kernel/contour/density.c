@@ -181,7 +181,7 @@ static batten_status find_pilot(batten_context *ctx, const contour_data *data, c
       breaks[i] = i == 0 ? 0 : i == spans ? 1 : contour_density_place(d, (double)i / (double)spans, &cell);
     st = contour_least_fit(ctx, data, parameters, pilot_degree, pilot_degree - 1, closed, spans, breaks, &f);
     if (st == BATTEN_E_SINGULAR) { /* too many already */
-      st = BATTEN_OK;
+      st = batten_expect(ctx, st, BATTEN_E_SINGULAR);
       break;
     }
     if (st < 0) break;

@@ -180,7 +180,7 @@ static batten_status try_spans(search *s, size_t spans, int rounds, trial *out) 
   }
   contour_least_free(s->ctx, &f);
   batten_free(s->ctx, breaks);
-  return st == BATTEN_E_SINGULAR ? BATTEN_OK : st;
+  return batten_expect(s->ctx, st, BATTEN_E_SINGULAR);
 }
 
 /* Spans for a tolerance; those that come nearest to it where it cannot be met. */

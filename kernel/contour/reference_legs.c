@@ -188,7 +188,7 @@ static batten_status smooth_angles(batten_context *ctx, legs *g) {
     contour_objective_set(ctx, &objective, task->data, task->parameters, w);
     st = contour_objective_solve(ctx, &objective, &space, control);
     if (st == BATTEN_E_SINGULAR)
-      st = BATTEN_OK;
+      st = batten_expect(ctx, st, BATTEN_E_SINGULAR);
     else if (st >= 0) {
       double wrong = read_turns(g, &space.b, control);
       if (wrong < least) {

@@ -15,6 +15,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/checked.h"
+
 /* 64: fits; some ten are common. Tension grows by 8 up to TENSION_MOST: that is near to a straight line. */
 enum { FITS = 64, TENSION_FACTOR = 8, CLOSED_SPANS = 4 };
 static const double tension_first = 1e-9, tension_most = 1e-3;
@@ -142,7 +144,7 @@ static batten_status try_subset(batten_context *ctx, removal *r, double *control
     st = contour_objective_solve(ctx, &objective, &space, fit);
   }
   bool solved = st >= 0;
-  if (st == BATTEN_E_SINGULAR) st = BATTEN_OK;
+  st = batten_expect(ctx, st, BATTEN_E_SINGULAR);
   if (st < 0) goto done;
   if (solved) {
     reference_assess(&s, &space.b, fit, r->quality);

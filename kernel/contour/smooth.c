@@ -327,6 +327,7 @@ batten_status contour_smooth_fit(batten_context *ctx, const contour_data *data, 
     way = finer ? 1 : -1;
     contour_smooth_free(ctx, &s);
   }
+  s.fitted = s.noise;
   /* fmax: local may be NaN */
   s.noise = fmax(s.noise, fmax(TIGHT * deviations.local, deviations.correlated));
   *out = s;

@@ -29,6 +29,7 @@ typedef struct contour_smooth {
   double count;             /* points of positive weight; their weights have the mean 1 */
   double lambda, bandwidth; /* lambda = count * bandwidth^6: about how far the curve averages */
   double noise;             /* standard deviation of a coordinate of weight 1 */
+  double fitted;            /* that which the fit alone tells, and neighbours do not raise */
 } contour_smooth;
 
 /* parameters [count] in [0, 1] in any order. Fails: NOMEM, TOO_LARGE, CANCELLED (progress phase "inflections"). */

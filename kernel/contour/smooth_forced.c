@@ -17,6 +17,11 @@
 static const double STIFF[] = {1e2, 1e4, 1e6};
 enum { LEVELS = sizeof STIFF / sizeof *STIFF, STEPS = 12, HALVINGS = 30 };
 
+/* Sites in a span. x'' is cubic there: where it bends one way at both, it does so in the mean. */
+static const double GAUSS[CONTOUR_SITES] = {0.211324865405187118, 0.788675134594812882};
+/* So far may x' turn from that of the smoothing spline where its sign is told, before springs follow it no more. */
+static const double TURN_MOST = 1;
+
 static size_t band_width(const contour_smooth *s) { return 2 * s->width + 1; }
 
 batten_status contour_forced_new(batten_context *ctx, const contour_smooth *s, double lambda, contour_forced *out) {
@@ -36,7 +41,7 @@ batten_status contour_forced_new(batten_context *ctx, const contour_smooth *s, d
   double stiff = pow(lambda / s->lambda, 5.0 / 6);
   for (size_t i = 0; i < f.count; i++) {
     size_t span = i / CONTOUR_SITES;
-    double u = ((double)(i % CONTOUR_SITES) + 0.5) / CONTOUR_SITES;
+    double u = GAUSS[i % CONTOUR_SITES];
     double variance = contour_smooth_variance(s, ((double)span + u) / (double)s->spans);
     f.sites[i] = (contour_site){.span = span, .u = u, .stiff = stiff / variance};
   }
@@ -69,16 +74,31 @@ static void fill_system(contour_forced *f) {
   }
 }
 
+/* The direction of x', but not far from that of the smoothing spline: else a run could turn its sign by a loop between
+ * points, where these are few. */
+static void limit_turn(const double smooth[2], double d[2]) {
+  double size = hypot(smooth[0], smooth[1]), along = smooth[0] * d[0] + smooth[1] * d[1];
+  double across = smooth[0] * d[1] - smooth[1] * d[0], angle = atan2(across, along);
+  if (!(size > 0) || fabs(angle) <= TURN_MOST) return;
+  double c = cos(TURN_MOST), sn = angle > 0 ? sin(TURN_MOST) : -sin(TURN_MOST);
+  d[0] = c * smooth[0] - sn * smooth[1];
+  d[1] = sn * smooth[0] + c * smooth[1];
+}
+
 /* The row of a site, [x', x''] / |x'| with x' that of the direction: functions `rows` [6], values [6][2]. */
 static void make_row(const contour_forced *f, const contour_site *site, size_t *rows, double (*values)[2]) {
   const contour_smooth *s = f->smooth;
-  double first[SMOOTH_ORDER], second[SMOOTH_ORDER], d[2] = {0, 0};
+  double first[SMOOTH_ORDER], second[SMOOTH_ORDER], d[2] = {0, 0}, smooth[2] = {0, 0};
   contour_smooth_basis(s, site->u, 1, first);
   contour_smooth_basis(s, site->u, 2, second);
   for (size_t k = 0; k < SMOOTH_ORDER; k++) {
     rows[k] = contour_smooth_row(s, site->span + k);
-    for (size_t c = 0; c < 2; c++) d[c] += first[k] * f->direction[c * s->functions + rows[k]];
+    for (size_t c = 0; c < 2; c++) {
+      d[c] += first[k] * f->direction[c * s->functions + rows[k]];
+      smooth[c] += first[k] * s->control[c * s->functions + rows[k]];
+    }
   }
+  limit_turn(smooth, d);
   double length = hypot(d[0], d[1]);
   if (!(length > 0)) length = 1;
   for (size_t k = 0; k < SMOOTH_ORDER; k++) {
