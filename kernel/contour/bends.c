@@ -476,10 +476,10 @@ void contour_bends_free(batten_context *ctx, contour_bends *b) {
   *b = (contour_bends){0};
 }
 
-/* By what lambda grows for weighing runs. It is the square of the noise over what is expected of the third derivative:
- * where more noise is taken for granted than the fit had, the rise of the sum is that of this larger lambda. But few
- * exact points leave a curve free between them, where the smoothing spline rings beside a sharp bend; without the
- * ringing the curve is rougher, and nothing else: the fewer they are, the less does that count. */
+/* By what lambda grows for weighing runs. It is the square of the noise over what is expected of the third
+ * derivative: where more noise is taken for granted than the fit had, the rise of the sum is that of this larger
+ * lambda. But few exact points leave a curve free between them, where the smoothing spline rings beside a sharp bend;
+ * without the ringing the curve is rougher, and nothing else: the fewer they are, the less does that count. */
 static double rougher(const search *s) {
   double more = s->noise / fmax(s->smooth->fitted, CONTOUR_EXACT * s->smooth->size);
   double many = s->smooth->count / CONTOUR_EVEN_COUNT;

@@ -74,8 +74,8 @@ static void fill_system(contour_forced *f) {
   }
 }
 
-/* The direction of x', but not far from that of the smoothing spline: else a run could turn its sign by a loop between
- * points, where these are few. */
+/* The direction of x', but not far from that of the smoothing spline: else a run could turn its sign by a loop
+ * between points, where these are few. */
 static void limit_turn(const double smooth[2], double d[2]) {
   double size = hypot(smooth[0], smooth[1]), along = smooth[0] * d[0] + smooth[1] * d[1];
   double across = smooth[0] * d[1] - smooth[1] * d[0], angle = atan2(across, along);

@@ -30,8 +30,8 @@ static inline size_t batten_first_nonfinite(size_t count, const double *values) 
   return i;
 }
 
-/* The power of two that brings |x| to [1, 2): multiplying by it is exact. x > 0 and finite; a subnormal x comes as near
- * to 1 as a double can bring it. */
+/* The power of two that brings |x| to [1, 2): multiplying by it is exact. x > 0 and finite; a subnormal x comes as
+ * near to 1 as a double can bring it. */
 static inline double batten_unit(double x) {
   int exponent = ilogb(x);
   return ldexp(1, -(exponent > -1022 ? exponent : -1022));
@@ -41,12 +41,12 @@ static inline double batten_unit(double x) {
 static inline batten_status batten_check_struct(batten_context *ctx, const char *name, size_t given,
                                                 size_t expected) {
   if (given == expected) return BATTEN_OK;
-  return batten_fail(ctx, BATTEN_E_INVALID, "%s.struct_size: %zu, expected %zu; start from %s_default()", name,
-                     given, expected, name);
+  return batten_fail(ctx, BATTEN_E_INVALID, "%s.struct_size: %zu, expected %zu; start from %s_default()", name, given,
+                     expected, name);
 }
 
-/* What a status means that the caller of a trial expected: that status is BATTEN_OK, and its text, which tells of nothing
- * that the user would meet, is taken back. Other statuses stay. */
+/* What a status means that the caller of a trial expected: that status is BATTEN_OK, and its text, which tells of
+ * nothing that the user would meet, is taken back. Other statuses stay. */
 static inline batten_status batten_expect(batten_context *ctx, batten_status status, batten_status expected) {
   return status == expected ? batten_fail(ctx, BATTEN_OK, "%s", "") : status;
 }
