@@ -113,8 +113,8 @@ batten_status contour_knots_place(batten_context *ctx, const contour_data *data,
                                   const contour_knots_options *opt, size_t *pieces, double **breaks);
 
 /* Up to `passes` steps of each point to a nearer place; parameters [count] stay in [0, 1]; the first point at 0 and
- * the last at 1 stay there. closed: all go round. No distance rises. squares [count]: squared distances from the new
- * places. On the context's threads. */
+ * the last at 1 of those with a weight stay there. closed: all go round. No distance rises. squares [count]: squared
+ * distances from the new places. On the context's threads. */
 void contour_correct(batten_context *ctx, const bspline *space, bool closed, const double *control,
                      const contour_data *data, unsigned passes, double *parameters, double *squares);
 
@@ -138,6 +138,9 @@ typedef struct contour_space {
 batten_status contour_space_make(batten_context *ctx, const contour_shape *shape, unsigned degree, bool inflections,
                                  const contour_ends *ends, contour_space *out);
 void contour_space_free(batten_context *ctx, contour_space *s);
+/* Whether control [count][2] leaves its ends along their tangents, and not the other way: a space of curves holds
+ * both. Inequalities around a reference that does keep it so. */
+bool contour_forward(const contour_ends *ends, size_t count, const double *control);
 /* control [b.count][2] of y. */
 void contour_space_expand(const contour_space *s, const double *y, double *control);
 

@@ -36,8 +36,8 @@ typedef struct fit {
   contour_rows rows;
   bool have_rows;
   batten_qp_workspace *workspace;
-  size_t n;                                 /* control points */
-  double *free, *trial, *reference, *older; /* [n][2] */
+  size_t n;                                         /* control points */
+  double *free, *trial, *first, *reference, *older; /* [n][2] first: reference */
   double *places, *squares;
   track shaped, unconstrained;
   contour_verdict verdict;
@@ -76,7 +76,7 @@ static void free_fit(fit *f) {
   contour_space_free(f->ctx, &f->space);
   contour_layout_free(f->ctx, &f->layout);
   contour_input_free(f->ctx, &f->in);
-  double *blocks[] = {f->free, f->trial, f->reference, f->older, f->places, f->squares};
+  double *blocks[] = {f->free, f->trial, f->first, f->reference, f->older, f->places, f->squares};
   for (size_t i = sizeof blocks / sizeof *blocks; i-- > 0;) batten_free(f->ctx, blocks[i]);
 }
 
@@ -86,11 +86,12 @@ static void take_ends(fit *f, size_t count, const double *points) {
   const batten_contour_options *o = f->opt;
   for (size_t e = 0; e < 2; e++) {
     const double *given = o->end_points[e], *own = points + (e ? 2 * count - 2 : 0), *tangent = o->end_tangents[e];
-    double length = hypot(tangent[0], tangent[1]);
+    double largest = fmax(fabs(tangent[0]), fabs(tangent[1])),
+           length = hypot(tangent[0] / largest, tangent[1] / largest);
     for (int k = 0; k < 2; k++) {
       double at = isnan(given[0]) ? own[k] : given[k];
       f->ends.point[e][k] = o->fix_ends[e] ? (at - f->in.middle[k]) * f->in.unit : NAN;
-      f->ends.tangent[e][k] = isnan(tangent[0]) ? NAN : tangent[k] / length;
+      f->ends.tangent[e][k] = isnan(tangent[0]) ? NAN : tangent[k] / largest / length;
     }
   }
 }
@@ -113,7 +114,7 @@ static batten_status begin(fit *f, size_t count, const double *points) {
   if (st >= 0) st = batten_qp_workspace_new(f->ctx, &f->workspace);
   if (st < 0) return st;
   f->n = f->space.b.count;
-  double **blocks[] = {&f->free, &f->trial, &f->reference, &f->older};
+  double **blocks[] = {&f->free, &f->trial, &f->first, &f->reference, &f->older};
   for (size_t i = 0; i < sizeof blocks / sizeof *blocks; i++)
     if (!(*blocks[i] = batten_alloc_array(f->ctx, f->n, 2 * sizeof(double)))) return BATTEN_E_NOMEM;
   f->places = batten_alloc_array(f->ctx, f->in.count, sizeof *f->places);
@@ -185,6 +186,7 @@ static batten_status solve_round(fit *f, unsigned round) {
   double start = batten_now();
   if (st >= 0)
     st = contour_rows_make(f->ctx, &f->layout.shape, &f->space.b, f->free, &f->row_options, NULL, &shaped, NULL);
+  shaped = shaped && contour_forward(&f->ends, f->n, f->free);
   if (st >= 0 && !shaped) st = next_rows(f);
   f->info.time_rows_s += batten_now() - start;
   if (st < 0) return st;
@@ -251,6 +253,7 @@ static batten_status find_reference(fit *f) {
   f->info.construction = r.construction;
   f->info.fallback = r.fallback;
   f->info.lsq_reference = unscaled(f, contour_sum(&f->space.b, f->reference, &f->data, f->in.parameters));
+  memcpy(f->first, f->reference, 2 * f->n * sizeof *f->first);
   memcpy(f->shaped.parameters, f->in.parameters, f->in.count * sizeof *f->in.parameters);
   offer(f, &f->shaped, f->reference, f->in.parameters);
   return BATTEN_OK;
@@ -282,15 +285,22 @@ static batten_status certify(fit *f) {
 }
 
 /* The best curve is certified as it is returned. Where it touches its inequalities and rounding of the caller's units
- * spoils that, it moves towards the reference, which keeps a distance, by as little as helps. */
+ * spoils that, as far from the origin, it moves by as little as helps: towards the last reference, which satisfies
+ * the same inequalities, but keeps a small part of what the first one has; then towards the first one. */
 static batten_status finish_curve(fit *f) {
-  static const double parts[] = {0, 1e-6, 1e-4, 1e-2, 0.1, 1};
+  const struct {
+    double part;
+    const double *towards;
+  } moves[] = {{0, f->reference},   {1e-6, f->reference}, {1e-4, f->reference}, {1e-2, f->reference},
+               {0.1, f->reference}, {1, f->reference},    {1e-3, f->first},     {1e-2, f->first},
+               {0.1, f->first},     {0.5, f->first},      {1, f->first}};
   batten_status st = BATTEN_OK;
   memcpy(f->older, f->shaped.control, 2 * f->n * sizeof *f->older);
-  for (size_t k = 0; k < sizeof parts / sizeof *parts && st >= 0 && !f->info.shape.certified; k++) {
+  for (size_t k = 0; k < sizeof moves / sizeof *moves && st >= 0 && !f->info.shape.certified; k++) {
+    double part = moves[k].part;
     if (k > 0) {
       f->shaped.sum = INFINITY;
-      for (size_t i = 0; i < 2 * f->n; i++) f->free[i] = (1 - parts[k]) * f->older[i] + parts[k] * f->reference[i];
+      for (size_t i = 0; i < 2 * f->n; i++) f->free[i] = (1 - part) * f->older[i] + part * moves[k].towards[i];
       offer(f, &f->shaped, f->free, f->shaped.parameters);
     }
     batten_curve_free(f->curve);
@@ -349,10 +359,11 @@ static double parameter_of(const fit *f, double t) {
 static batten_status judge(fit *f) {
   const contour_verdict *v = &f->verdict;
   if (!f->info.shape.certified)
-    return batten_fail(f->ctx, BATTEN_W_ACCURACY,
-                       "the curve is not proven to have the wanted shape near the parameter %g, where its curvature "
-                       "has %g to spare; raise opt.margin, or ask for fewer spans",
-                       f->info.shape.worst_at, f->info.shape.margin_min);
+    return batten_fail(
+        f->ctx, BATTEN_W_ACCURACY,
+        "the curve is not proven to have the wanted shape near the parameter %g, where its curvature "
+        "has %g to spare; raise opt.margin, ask for fewer spans, or move points that are far from the origin",
+        f->info.shape.worst_at, f->info.shape.margin_min);
   if (!v->contradicts) return BATTEN_OK;
   return batten_fail(
       f->ctx, BATTEN_W_SHAPE,

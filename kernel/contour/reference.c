@@ -77,6 +77,8 @@ void reference_assess(const contour_shape *shape, const bspline *b, const double
 batten_status reference_accept(batten_context *ctx, const reference_task *task, const bspline *b,
                                const double *reference, double *control, bool *accepted) {
   bspline_refine(b, 2, reference, &task->space->b, control);
+  *accepted = contour_forward(task->ends, task->space->b.count, control);
+  if (!*accepted) return BATTEN_OK;
   return contour_rows_make(ctx, task->shape, &task->space->b, control, task->rows, NULL, accepted, NULL);
 }
 

@@ -174,8 +174,9 @@ static void read_angles(legs *g, const bspline *b, const double *control) {
   if (g->whole == 0 && !both && g->vertices > 0) g->whole = 2 * pi * g->signs[0];
 }
 
-/* The curve of least smoothing whose legs turn mostly to the right side; if none, that with the least wrong turns. */
-static batten_status smooth_angles(batten_context *ctx, legs *g) {
+/* The curve of least smoothing whose legs turn mostly to the right side; if none, that with the least wrong turns.
+ * *found: rounding, over spans that are much too short, left one. */
+static batten_status smooth_angles(batten_context *ctx, legs *g, bool *found) {
   const reference_task *task = g->task;
   contour_space space = {0};
   contour_objective objective = {0};
@@ -198,8 +199,8 @@ static batten_status smooth_angles(batten_context *ctx, legs *g) {
     }
     if (w > smoothing_most) break;
   }
-  if (st >= 0 && isinf(least)) st = batten_fail(ctx, BATTEN_E_SINGULAR, "the smoothed curve is not determined");
-  if (st >= 0) {
+  *found = least < INFINITY;
+  if (st >= 0 && *found) {
     read_turns(g, &space.b, best);
     read_angles(g, &space.b, best);
   }
@@ -521,8 +522,9 @@ batten_status reference_by_legs(batten_context *ctx, const reference_task *task,
     double most = 0;
     for (int far = 0; st >= 0 && far < 2 && (far == 0 || g.unclear); far++) {
       g.far = far;
-      st = smooth_angles(ctx, &g);
-      if (st >= 0) st = try_attempts(ctx, &g, control, sum);
+      bool found = false;
+      st = smooth_angles(ctx, &g, &found);
+      if (st >= 0 && found) st = try_attempts(ctx, &g, control, sum);
       most = fmax(most, g.most);
     }
     enough = *sum < INFINITY && !g.unclear && most < turn_many * turn_unit(task->shape);

@@ -321,7 +321,10 @@ batten_status contour_smooth_fit(batten_context *ctx, const contour_data *data, 
     if (!finer && !coarser) {
       if (solved) break;
       contour_smooth_free(ctx, &s);
-      return batten_fail(ctx, BATTEN_E_SINGULAR, "points: rounding keeps them from being smoothed");
+      return batten_fail(
+          ctx, BATTEN_E_SINGULAR,
+          "points: rounding keeps them from being smoothed; give opt.weights, or opt.parameters, whose "
+          "sizes, or steps, differ by less");
     }
     spans = finer ? 2 * spans : spans / 2;
     way = finer ? 1 : -1;

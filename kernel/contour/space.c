@@ -118,6 +118,16 @@ static batten_status fix_ends(builder *b, size_t *equalities) {
   return BATTEN_OK;
 }
 
+bool contour_forward(const contour_ends *ends, size_t count, const double *control) {
+  for (int end = 0; end < 2; end++) {
+    const double *a = control + (end ? 2 * count - 4 : 0);
+    if (!tangent_fixed(ends, end)) continue;
+    const double *t = ends->tangent[end];
+    if (!((a[2] - a[0]) * t[0] + (a[3] - a[1]) * t[1] > 0)) return false;
+  }
+  return true;
+}
+
 static size_t number_unknowns(builder *b) {
   size_t unknowns = 0;
   for (size_t j = 0; j < b->bases; j++) {
