@@ -20,6 +20,7 @@ typedef struct job {
   const contour_data *data;
   unsigned passes;
   bool closed;
+  size_t first, last; /* points that count */
   double *parameters, *squares;
 } job;
 
@@ -85,10 +86,10 @@ static double newton_step(double jet[3][2], const double e[2]) {
   return curve > 0 ? -slope / curve : 0;
 }
 
-/* Whether point i is to stay: the first and the last at the ends of an open curve. */
+/* Whether point i is to stay: the first and the last that count at the ends of an open curve. */
 static bool held(const job *j, size_t i) {
   if (j->closed) return false;
-  return (i == 0 && j->parameters[i] == 0) || (i + 1 == j->data->count && j->parameters[i] == 1);
+  return (i == j->first && j->parameters[i] == 0) || (i == j->last && j->parameters[i] == 1);
 }
 
 static double correct_point(const job *j, unsigned passes, const double *point, size_t *span, double *parameter) {
@@ -128,6 +129,8 @@ static void correct_task(void *arg, size_t index) {
 
 void contour_correct(batten_context *ctx, const bspline *space, bool closed, const double *control,
                      const contour_data *data, unsigned passes, double *parameters, double *squares) {
-  job j = {space, control, data, passes, closed, parameters, squares};
+  job j = {space, control, data, passes, closed, 0, data->count - 1, parameters, squares};
+  while (data->weights && j.first < j.last && !(data->weights[j.first] > 0)) j.first++;
+  while (data->weights && j.last > j.first && !(data->weights[j.last] > 0)) j.last--;
   batten_parallel(ctx, data->count / CHUNK + (data->count % CHUNK != 0), correct_task, &j);
 }

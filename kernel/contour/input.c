@@ -70,9 +70,14 @@ static batten_status find_domain(batten_context *ctx, size_t count, const batten
   return t ? check_parameters(ctx, count, t, domain) : BATTEN_OK;
 }
 
+static bool counts(const contour_input *in, size_t i) { return !in->weights || in->weights[i] > 0; }
+
+/* To the size of the points that count. Others may lie anywhere, yet squares of their distances stay finite. */
 static void scale_points(contour_input *in, const double *points) {
-  double lower[2] = {points[0], points[1]}, upper[2] = {points[0], points[1]}, size = 0;
+  static const double FAR = 0x1p400;
+  double lower[2] = {INFINITY, INFINITY}, upper[2] = {-INFINITY, -INFINITY}, size = 0;
   for (size_t i = 0; i < 2 * in->count; i++) {
+    if (!counts(in, i / 2)) continue;
     lower[i % 2] = fmin(lower[i % 2], points[i]);
     upper[i % 2] = fmax(upper[i % 2], points[i]);
   }
@@ -81,7 +86,8 @@ static void scale_points(contour_input *in, const double *points) {
     size = fmax(size, upper[k] - lower[k]);
   }
   in->unit = size > 0 ? batten_unit(size) : 1;
-  for (size_t i = 0; i < 2 * in->count; i++) in->points[i] = (points[i] - in->middle[i % 2]) * in->unit;
+  for (size_t i = 0; i < 2 * in->count; i++)
+    in->points[i] = fmax(-FAR, fmin(FAR, (points[i] - in->middle[i % 2]) * in->unit));
 }
 
 static void scale_weights(contour_input *in, const double *weights) {
@@ -99,14 +105,14 @@ static void scale_weights(contour_input *in, const double *weights) {
 static bool on_line(const contour_input *in) {
   size_t first = 0, far = 0;
   double most = 0, off = 0, reach = 1;
-  while (in->weights && !(in->weights[first] > 0)) first++;
+  while (!counts(in, first)) first++;
   const double *p = in->points + 2 * first;
   for (int pass = 0; pass < 2; pass++)
     for (size_t i = first; i < in->count; i++) {
       const double *q = in->points + 2 * i, v[2] = {q[0] - p[0], q[1] - p[1]};
       const double line[2] = {in->points[2 * far] - p[0], in->points[2 * far + 1] - p[1]};
       double length = hypot(v[0], v[1]);
-      if (in->weights && !(in->weights[i] > 0)) continue;
+      if (!counts(in, i)) continue;
       if (pass == 0 && length > most) {
         most = length;
         far = i;
@@ -118,27 +124,48 @@ static bool on_line(const contour_input *in) {
   return off <= 64 * DBL_EPSILON * reach;
 }
 
+/* Parameters of points that count; others, which may be outliers, take that of the one before. */
+static batten_status estimate(batten_context *ctx, contour_input *in, const batten_contour_options *o) {
+  if (!in->weights)
+    return batten_contour_parametrize(ctx, in->count, in->points, o->parametrization, o->closed, in->parameters);
+  size_t counted = 0;
+  double *points = batten_alloc_array(ctx, in->count, 3 * sizeof *points);
+  if (!points) return BATTEN_E_NOMEM;
+  double *parameters = points + 2 * in->count;
+  for (size_t i = 0; i < in->count; i++)
+    if (counts(in, i)) memcpy(points + 2 * counted++, in->points + 2 * i, 2 * sizeof *points);
+  batten_status st = batten_contour_parametrize(ctx, counted, points, o->parametrization, o->closed, parameters);
+  for (size_t i = 0, k = 0; i < in->count && st >= 0; i++) {
+    if (counts(in, i)) k++;
+    in->parameters[i] = parameters[k ? k - 1 : 0];
+  }
+  batten_free(ctx, points);
+  return st;
+}
+
 static batten_status fill(batten_context *ctx, contour_input *in, const double *points,
                           const batten_contour_options *o) {
   in->points = batten_alloc_array(ctx, in->count, 2 * sizeof(double));
   in->parameters = batten_alloc_array(ctx, in->count, sizeof(double));
   if (o->weights) in->weights = batten_alloc_array(ctx, in->count, sizeof(double));
   if (!in->points || !in->parameters || (o->weights && !in->weights)) return BATTEN_E_NOMEM;
-  scale_points(in, points);
   scale_weights(in, o->weights);
   if (!(in->total > 0))
     return batten_fail(ctx, BATTEN_E_INVALID, "opt.weights: all 0 but of the repeated first point; give others one");
-  if (on_line(in))
+  scale_points(in, points);
+  if (on_line(in)) {
+    size_t counted = 0;
+    for (size_t i = 0; i < in->count; i++) counted += counts(in, i);
     return batten_fail(
         ctx, BATTEN_E_INVALID,
         "points: all %zu%s are one point or lie on a line, to rounding; a curve that bends needs others "
         "beside it",
-        in->count, o->weights ? " of positive weight" : "");
+        counted, o->weights ? " of positive weight" : "");
+  }
   double begin = in->domain[0], width = in->domain[1] - in->domain[0];
   for (size_t i = 0; i < in->count && o->parameters; i++)
     in->parameters[i] = fmin(1, (o->parameters[i] - begin) / width);
-  if (o->parameters) return BATTEN_OK;
-  return batten_contour_parametrize(ctx, in->count, in->points, o->parametrization, o->closed, in->parameters);
+  return o->parameters ? BATTEN_OK : estimate(ctx, in, o);
 }
 
 batten_status contour_input_make(batten_context *ctx, size_t count, const double *points,

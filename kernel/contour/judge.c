@@ -35,6 +35,7 @@ static double size_of(const contour_data *data) {
   for (size_t d = 0; d < 2; d++) {
     double lower = INFINITY, upper = -INFINITY;
     for (size_t i = 0; i < data->count; i++) {
+      if (!(weight_of(data, i) > 0)) continue;
       lower = fmin(lower, data->points[2 * i + d]);
       upper = fmax(upper, data->points[2 * i + d]);
     }

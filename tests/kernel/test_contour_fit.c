@@ -321,6 +321,106 @@ static void test_ends(batten_context *ctx) {
   contour_scene_free(&s);
 }
 
+/* Tangents are directions, not lines: wherever they point, curves leave their ends along them. */
+static void test_tangents(batten_context *ctx) {
+  enum { COUNT = 60 };
+  double points[2 * COUNT], inflection = 0.5;
+  size_t fitted = 0, against = 0;
+  for (size_t i = 0; i < COUNT; i++) {
+    double t = (double)i / (COUNT - 1);
+    points[2 * i] = 4 * t;
+    points[2 * i + 1] = sin(6 * t);
+  }
+  batten_contour_options o = batten_contour_options_default();
+  o.inflections = &inflection;
+  o.inflection_count = 1;
+  o.sign = -1;
+  for (int k = 0; k < 14; k++) {
+    int end = k % 2;
+    double angle = atan2(end ? 6 * cos(6.0) : 6, 4) + k / 2, size = k % 4 < 2 ? 1.7e308 : 1e-300;
+    for (int e = 0; e < 2; e++) o.end_tangents[e][0] = o.end_tangents[e][1] = NAN;
+    o.end_tangents[end][0] = size * cos(angle);
+    o.end_tangents[end][1] = size * sin(angle);
+    o.degree = k % 3 ? 3 : 5;
+    result r = fit(ctx, COUNT, points, &o);
+    if (r.status < 0) {
+      printf("# turned by %d: %s %s\n", k / 2, batten_status_name(r.status), batten_error(ctx));
+      continue;
+    }
+    fitted += r.info.shape.certified != 0;
+    batten_curve_form f = batten_curve_get(r.curve);
+    const double *a = f.control_points + (end ? 2 * (f.knot_count - f.degree - 3) : 0);
+    against += fabs(atan2(cos(angle) * (a[3] - a[1]) - sin(angle) * (a[2] - a[0]),
+                          cos(angle) * (a[2] - a[0]) + sin(angle) * (a[3] - a[1]))) > 1e-9;
+    batten_curve_free(r.curve);
+  }
+  T_CHECK(fitted == 14 && against == 0, "14 tangents: %zu proven, %zu run another way", fitted, against);
+}
+
+/* Where rounding far from the origin spoils the best curve, one that keeps more of its reference is found. */
+static void test_far(batten_context *ctx) {
+  enum { COUNT = 200 };
+  double points[2 * COUNT];
+  size_t proven = 0, moved = 0;
+  for (unsigned k = 0; k < 8; k++) {
+    uint64_t seed = 7 + k;
+    for (size_t i = 0; i < COUNT; i++) {
+      double t = (double)i / (COUNT - 1);
+      points[2 * i] = 1e9 + 4 * t + 2e-3 * (t_uniform(&seed) - 0.5);
+      points[2 * i + 1] = sin((k % 2 ? 6 : 3) * t) - 1e9 + 2e-3 * (t_uniform(&seed) - 0.5);
+    }
+    batten_contour_options o = batten_contour_options_default();
+    o.degree = k & 2 ? 5 : 3;
+    o.inflection_count = 0;
+    o.spans = k & 4 ? 60 : 20;
+    result r = fit(ctx, COUNT, points, &o);
+    proven += r.status >= 0 && r.status != BATTEN_W_ACCURACY && r.info.shape.certified;
+    moved += r.status >= 0 && r.info.lsq > r.info.lsq_per_round[r.info.rounds - 1];
+    if (r.status == BATTEN_W_ACCURACY) printf("# far, %u: %s\n", k, batten_error(ctx));
+    batten_curve_free(r.curve);
+  }
+  T_CHECK(proven == 8 && moved > 0, "1e9 away: %zu of 8 proven, %zu of them moved", proven, moved);
+}
+
+/* Points of weight 0 are as if they were not there, wherever they are. */
+static void test_masked(batten_context *ctx) {
+  enum { COUNT = 150, MASKED = 5 };
+  const double places[MASKED] = {1e4, -1e12, 1e299, 0, 1};
+  double points[2 * COUNT], more[2 * (COUNT + MASKED)], weights[COUNT + MASKED], parameters[COUNT + MASKED];
+  for (size_t i = 0; i < COUNT; i++) {
+    double t = (double)i / (COUNT - 1);
+    points[2 * i] = 4 * t + 1e-3 * sin(97.0 * (double)i);
+    points[2 * i + 1] = sin(6 * t) + 1e-3 * sin(57.0 * (double)i);
+  }
+  for (size_t i = 0, at = 0; i < COUNT; i++) {
+    for (size_t k = 0; k < MASKED && i % 37 == 0 && at < i + i / 37 + 1; k++) { /* one, the first before all */
+      weights[at] = 0;
+      more[2 * at] = places[i / 37];
+      more[2 * at + 1] = -places[i / 37];
+      at++;
+    }
+    weights[at] = 1;
+    memcpy(more + 2 * at, points + 2 * i, 2 * sizeof *more);
+    at++;
+  }
+  batten_contour_options o = batten_contour_options_default();
+  const double inflection = 0.52;
+  o.spans = 9;
+  o.inflections = &inflection;
+  o.inflection_count = 1;
+  o.sign = -1;
+  result a = fit(ctx, COUNT, points, &o), b = {.curve = NULL};
+  o.weights = weights;
+  b.status = batten_contour_fit(ctx, COUNT + MASKED, more, &o, &b.curve, parameters, NULL, &b.info);
+  T_CHECK(a.status == BATTEN_OK && b.status == BATTEN_OK, "points of weight 0: %s, %s", batten_status_name(b.status),
+          b.status ? batten_error(ctx) : "");
+  T_RATIO(fabs(b.info.lsq / a.info.lsq - 1), 1e-9, "the sum is as without them");
+  T_RATIO(fabs(b.info.misfit / a.info.misfit - 1), 0.05, "and so is the misfit");
+  T_CHECK(parameters[1] == 0 && parameters[COUNT + MASKED - 1] == 1, "ends are held by points that count");
+  batten_curve_free(b.curve);
+  batten_curve_free(a.curve);
+}
+
 /* Tension holds places without data, and takes nothing from the data that there are: however many spans. */
 static void test_tension(batten_context *ctx) {
   enum { COUNT = 6000, SPANS = 1000 };
@@ -427,6 +527,9 @@ int main(void) {
   test_domain(ctx);
   test_threads();
   test_ends(ctx);
+  test_tangents(ctx);
+  test_far(ctx);
+  test_masked(ctx);
   test_tension(ctx);
   test_few_points(ctx);
   test_few_spans(ctx);

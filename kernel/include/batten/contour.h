@@ -46,7 +46,8 @@ typedef struct batten_contour_options {
   double domain[2];      /* of the given parameters, and of the curve; closed: domain[1] is where the first point
                             comes again. NaN: from the first to the last parameter (closed: must be given). Default
                             NaN. */
-  const double *weights; /* [count] >= 0, NULL = ones */
+  const double *weights; /* [count] >= 0, NULL = ones. Points of weight 0 do not count: as if they were not there, but
+                            that they get parameters, of the places that are near to them */
 
   size_t break_count;   /* inner knots that are wanted; each becomes degree - smoothness fold */
   const double *breaks; /* [break_count] ascending, inside the domain; inflections join them. NULL = placed. */
@@ -101,7 +102,8 @@ typedef struct batten_contour_info {
                                        least */
   double lsq_unconstrained_first;   /* the same at the first parameters */
   double lsq_reference;             /* first reference curve, first parameters */
-  double lsq;                       /* of the result */
+  double lsq;                       /* of the result. Above the last of lsq_per_round where rounding, far from the
+                                       origin, spoils the shape of the best curve, and the result moved away from it */
   double rms, max_error;            /* of the result: distances of points from their places */
   size_t max_error_index;           /* that point */
   unsigned construction;            /* that gave the first reference: 1 or 2 */
@@ -171,8 +173,8 @@ typedef struct batten_contour_proposal {
 } batten_contour_proposal;
 
 /* Smooths the points, and tells bends from noise. What is taken for noise: what the smoothing spline leaves, between
- * 0.85 and 2.4 times what neighbouring points tell (the distances of points across the cubics through two neighbours on
- * both sides); and where those distances grow slowly with the neighbours' steps, as in outlines that were drawn by
+ * 0.85 and 2.4 times what neighbouring points tell (the distances of points across the cubics through two neighbours
+ * on both sides); and where those distances grow slowly with the neighbours' steps, as in outlines that were drawn by
  * hand or follow pixels, the distance across neighbours four points away: neighbours deviate alike there, and bends
  * of a few points do not count. No less than 1e-4 of the points' size up to 100 points; with their number's root
  * for more. Uses of opt: closed, parameters, parametrization, domain, weights,
