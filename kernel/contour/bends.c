@@ -21,8 +21,9 @@
 static const double NO_SIGN = 1e-3;
 /* The sign of curvature is certain from here on, in its standard deviations. */
 static const double CERTAIN = 2;
-/* Runs that a parabola shows to be so few standard deviations join without a fit. */
-static const double NOISE_ALONE = 1;
+/* Runs that a parabola shows to be so few standard deviations join without a fit. In a curve that bends the other way
+ * around the run the fit finds up to seven times as many: there its neighbours must give way far. */
+static const double NOISE_ALONE = 0.2;
 /* Roughness counts no less than this part of what it does in the smoothing. */
 static const double ROUGH_LEAST = 0.1;
 /* Between two inflections, and beyond the last one, lie so many points, or nothing speaks for a run. */
@@ -283,9 +284,8 @@ static size_t count_points(const search *s, double from, double to, size_t most)
   return count;
 }
 
-/* About the significance of a group if it bent evenly and became straight: m points on a parabola of length l that
- * turns by a are off their line by (a l)^2 / 720 in the mean square. That is more than the fit can tell, whose
- * neighbouring runs give way. */
+/* The significance of a group if it bent evenly between straight pieces and became straight: m points on a parabola
+ * of length l that turns by a are off their line by (a l)^2 / 720 in the mean square. */
 static double parabola(const search *s, const group *g) {
   double turn = fmax((angle_at(s, g->to) - angle_at(s, g->from)) * g->sign, 0);
   double length = length_at(s, g->to) - length_at(s, g->from);

@@ -5,21 +5,24 @@
  * does not see the places where it is not [Rousseeuw, Croux 1993], as long as they are not most of the curve.
  *
  * From k to 2 k it stays where noise is white, and grows 16 times, as the error of cubics, where the data are a
- * smooth curve. Where both are there, one doubling at most is between the two. Data that were drawn by hand or follow
- * the pixels of a picture differ: neighbours deviate alike, and by what they deviate grows a few times at every
- * scale, like the way of a random walk. Two doublings with such growth have neither noise nor a smooth curve. */
+ * smooth curve. Where both are there, one doubling is between the two, or two where parts of the curve differ much.
+ * Data that were drawn by hand or follow the pixels of a picture differ: neighbours deviate alike, and by what they
+ * deviate grows a few times at every scale, like the way of a random walk. Three doublings with such growth have
+ * neither noise nor a smooth curve. */
 #include "deviations.h"
 
 #include "base/checked.h"
 #include "basis/quantile.h"
 
 /* Fewer distances tell nothing; fewer points no growth, since features of a few points grow slowly, too. */
-enum { FEW = 5, SCALES = 3, POINTS_MIN = 48 };
+enum { FEW = 5, SCALES = 4, POINTS_MIN = 48 };
 /* Parts of the distances: of next neighbours as many as are calm where half of few points are not; and the quantiles
  * of |.| of normal numbers. */
 static const double PART = 0.375, PART_NORMAL = 0.488776411114669, HALF_NORMAL = 0.674489750196081743;
-/* Growth by each doubling, and by both together. */
-static const double SLOW_LEAST = 1.6, SLOW_MOST = 7, SLOW_BOTH = 24;
+/* Growth by each doubling: what chance makes of white noise is below, smooth curves of some noise grow by more; what
+ * neighbours share may end at the last. */
+static const double SLOW_LEAST[SCALES - 1] = {1.6, 1.6, 0.9}, SLOW_MOST[SCALES - 1] = {7, 7, 10};
+static const double SLOW_BOTH = 24; /* by the first two together */
 
 /* Point i's distance across the chord of its neighbours in units of noise; false: it has no such neighbours. */
 static bool distance_of(const contour_data *data, const double *parameters, bool closed, size_t i, size_t k,
@@ -72,9 +75,12 @@ batten_status contour_deviations_find(batten_context *ctx, const contour_data *d
     if (k == 0 && count >= FEW) out->local = weighted_quantile(count, samples, PART) / PART_NORMAL;
   }
   batten_free(ctx, samples);
-  double first = scales[1] / scales[0], second = scales[2] / scales[1];
-  bool slow = first >= SLOW_LEAST && first <= SLOW_MOST && second >= SLOW_LEAST && second <= SLOW_MOST &&
-              first * second <= SLOW_BOTH && data->count >= POINTS_MIN;
+  bool slow = data->count >= POINTS_MIN;
+  for (size_t k = 0; k + 1 < SCALES; k++) {
+    double growth = scales[k + 1] / scales[k];
+    slow = slow && growth >= SLOW_LEAST[k] && growth <= SLOW_MOST[k]; /* not of NaN */
+  }
+  slow = slow && scales[2] / scales[0] <= SLOW_BOTH;
   if (slow) {
     out->correlated = scales[2];
     out->reach = 4;
