@@ -203,7 +203,7 @@ void curve_summary(const curve_work *w) {
     cli_line("deviation", "rms %.4g, largest %.4g at point %zu of contour %zu", total_rms(w, t.points), t.max_error,
              w->items[t.worst].info.max_error_index, w->items[t.worst].number);
   if (t.certified)
-    cli_line("shape", "proven: exactly %zu inflection%s (%zu without inequalities), |curvature| at least %.3g",
+    cli_line("shape", "proven: exactly %zu inflection%s (%zu without inequalities), margin %.3g",
              t.wanted, t.wanted == 1 ? "" : "s", t.found_free, t.margin);
   else
     cli_line("shape", "NOT proven: %zu inflections wanted, %zu found", t.wanted, t.found);

@@ -487,7 +487,7 @@ static void test_many(batten_context *ctx) {
     size_t waves, per_wave;
     double height, noise;
   } rows[] = {{WAVES, PER_WAVE, 0.3, 0}, {WAVES, PER_WAVE, 0.3, 1e-3}, {MOST, FEW, 0.4, 0}};
-  double *points = contour_scene_allocate((size_t)2 * (MOST * FEW + 1));
+  double *points = contour_scene_allocate((size_t)2 * (WAVES * PER_WAVE + MOST * FEW + 1));
   for (size_t k = 0; k < sizeof rows / sizeof *rows; k++) {
     const size_t count = rows[k].waves * rows[k].per_wave + 1;
     uint64_t seed = 1;
