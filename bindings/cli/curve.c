@@ -94,12 +94,10 @@ static const cli_option table[] = {
 static void print_help(void) {
   printf(
       "usage: batten curve POINTS [OPTIONS]\n\n"
-      "Fits a smooth spline curve to points in order whose curvature is proven to have the wanted signs: exactly "
-      "the\n"
-      "wanted inflections, no wiggle. POINTS: x y, or x y z of a plane, with names in the first line also t "
-      "(parameter)\n"
-      "and w (weight): .txt .xyz .csv; several contours parted by blank lines, by lines `contour N`, or by a column\n"
-      "contour; also with .gz.\n\n");
+      "Fits a smooth spline curve to points in order whose curvature is proven to have the wanted signs: exactly\n"
+      "the wanted inflections, no wiggle. POINTS: x y, or x y z of a plane, with names in the first line also t\n"
+      "(parameter) and w (weight): .txt .xyz .csv .dat; several contours parted by blank lines, by lines\n"
+      "`contour N`, or by a column contour; tables of airfoils (Selig, Lednicer); also with .gz.\n\n");
   cli_options_print(table);
   printf(
       "\nexample: noisy points of a wave, whose inflections are found\n\n"

@@ -82,6 +82,19 @@ static void executor(void *user, size_t tasks, void (*task)(void *, size_t), voi
   for (size_t i = tasks; i-- > 0;) task(arg, i);
 }
 
+/* A failure that was expected leaves no text; another one stays. */
+static void test_expected(void) {
+  batten_context *ctx = t_context(NULL, NULL, 1);
+  batten_status st = batten_fail(ctx, BATTEN_E_SINGULAR, "points: too few");
+  st = batten_expect(ctx, st, BATTEN_E_SINGULAR);
+  T_CHECK(st == BATTEN_OK && strcmp(batten_error(ctx), "") == 0, "a failure that was expected is none: \"%s\"",
+          batten_error(ctx));
+  st = batten_fail(ctx, BATTEN_E_NOMEM, "no more");
+  st = batten_expect(ctx, st, BATTEN_E_SINGULAR);
+  T_CHECK(st == BATTEN_E_NOMEM && strcmp(batten_error(ctx), "no more") == 0, "another one stays, with its text");
+  batten_context_free(ctx);
+}
+
 static void test_parallel(void) {
   enum { N = 1000 };
   static double one[N], v[N];
@@ -154,6 +167,7 @@ int main(void) {
   test_options();
   test_memory();
   test_checked();
+  test_expected();
   test_parallel();
   test_signals();
   test_progress();
