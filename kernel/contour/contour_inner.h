@@ -164,8 +164,7 @@ typedef struct contour_objective {
 } contour_objective;
 batten_status contour_objective_new(batten_context *ctx, const bspline *b, contour_objective *out);
 void contour_objective_free(batten_context *ctx, contour_objective *o);
-void contour_objective_set(batten_context *ctx, contour_objective *o, const contour_data *data,
-                           const double *parameters, double tension);
+void contour_objective_set(contour_objective *o, const contour_data *data, const double *parameters, double tension);
 /* Its minimum in a space: control [b.count][2]. Fails: SINGULAR, NOMEM. Time and room O(b.count) (closed ones too).
  */
 batten_status contour_objective_solve(batten_context *ctx, const contour_objective *o, const contour_space *space,

@@ -45,7 +45,7 @@ batten_status contour_least_fit(batten_context *ctx, const contour_data *data, c
   f.control = batten_alloc_array(ctx, f.space.b.count, 2 * sizeof(double));
   st = f.control ? contour_objective_new(ctx, &f.space.b, &o) : BATTEN_E_NOMEM;
   if (st < 0) goto done;
-  contour_objective_set(ctx, &o, data, parameters, contour_tension(CONTOUR_TENSION, spans));
+  contour_objective_set(&o, data, parameters, contour_tension(CONTOUR_TENSION, spans));
   st = contour_objective_solve(ctx, &o, &f.space, f.control);
   if (st < 0) goto done;
   *out = f;

@@ -148,7 +148,7 @@ static bool offer(fit *f, track *t, const double *control, const double *from) {
 
 /* The minimum in a space with points at parameters: f->free. */
 static batten_status solve_free(fit *f, const contour_space *space, const double *parameters) {
-  contour_objective_set(f->ctx, &f->objective, &f->data, parameters, f->tension);
+  contour_objective_set(&f->objective, &f->data, parameters, f->tension);
   return contour_objective_solve(f->ctx, &f->objective, space, f->free);
 }
 

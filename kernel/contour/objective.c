@@ -102,9 +102,7 @@ static void values_at(const bspline *b, size_t mu, double t, double *values) {
 
 static double weight_of(const contour_data *data, size_t i) { return data->weights ? data->weights[i] : 1; }
 
-void contour_objective_set(batten_context *ctx, contour_objective *o, const contour_data *data,
-                           const double *parameters, double tension) {
-  (void)ctx;
+void contour_objective_set(contour_objective *o, const contour_data *data, const double *parameters, double tension) {
   const bspline *b = &o->b;
   size_t order = b->degree + 1, mu = bspline_first(b);
   double total = 0, values[BSPLINE_ORDER];

@@ -186,7 +186,7 @@ static batten_status smooth_angles(batten_context *ctx, legs *g, bool *found) {
   double *best = control ? control + 2 * space.b.count : NULL;
   st = control ? contour_objective_new(ctx, &space.b, &objective) : BATTEN_E_NOMEM;
   for (double w = fmax(task->tension, smoothing_first); st >= 0 && least > calm; w *= smoothing_factor) {
-    contour_objective_set(ctx, &objective, task->data, task->parameters, w);
+    contour_objective_set(&objective, task->data, task->parameters, w);
     st = contour_objective_solve(ctx, &objective, &space, control);
     if (st == BATTEN_E_SINGULAR)
       st = batten_expect(ctx, st, BATTEN_E_SINGULAR);

@@ -140,7 +140,7 @@ static batten_status try_subset(batten_context *ctx, removal *r, double *control
   fit = batten_alloc_array(ctx, 2 * space.b.count, sizeof *fit);
   st = fit ? contour_objective_new(ctx, &space.b, &objective) : BATTEN_E_NOMEM;
   if (st >= 0) {
-    contour_objective_set(ctx, &objective, task->data, task->parameters, r->tension);
+    contour_objective_set(&objective, task->data, task->parameters, r->tension);
     st = contour_objective_solve(ctx, &objective, &space, fit);
   }
   bool solved = st >= 0;

@@ -64,13 +64,13 @@ static void test_again(batten_context *ctx) {
     contour_space_expand(&space, y, s->control);
     for (size_t j = 0; j < POINTS; j++) point_at(&space.b, s->control, s->parameters[j], s->points + 2 * j);
     if (contour_objective_new(ctx, &space.b, &o) != BATTEN_OK) break;
-    contour_objective_set(ctx, &o, &s->data, s->parameters, 0);
+    contour_objective_set(&o, &s->data, s->parameters, 0);
     if (contour_objective_solve(ctx, &o, &space, control) == BATTEN_OK) cases++;
     for (size_t j = 0; j < 2 * space.b.count; j++) worst = fmax(worst, fabs(control[j] - s->control[j]));
     sums = fmax(sums, contour_sum(&space.b, control, &s->data, s->parameters));
     /* the gradient at the minimum of other points, with tension, by differences along each unknown */
     for (size_t j = 0; j < 2 * POINTS; j++) s->points[j] += 0.1 * t_uniform(&seed);
-    contour_objective_set(ctx, &o, &s->data, s->parameters, 1e-6);
+    contour_objective_set(&o, &s->data, s->parameters, 1e-6);
     contour_objective_solve(ctx, &o, &space, control);
     double total = 0;
     for (size_t j = 0; j < POINTS; j++) total += s->weights[j];
@@ -110,7 +110,7 @@ static void test_tension(batten_context *ctx) {
     contour_objective o;
     if (contour_space_make(ctx, &s->shape, degree, false, NULL, &space) != BATTEN_OK) break;
     if (contour_objective_new(ctx, &space.b, &o) != BATTEN_OK) break;
-    contour_objective_set(ctx, &o, &s->data, s->parameters, 1e-3);
+    contour_objective_set(&o, &s->data, s->parameters, 1e-3);
     size_t n = space.b.count;
     double bend[2] = {0, 0}, control[2 * COUNT];
     for (size_t j = 0; j < n; j++) { /* blossoms of t^2 and t^3 at the knots */
@@ -149,7 +149,7 @@ static void test_short(batten_context *ctx) {
   double control[2 * COUNT];
   T_OK(contour_space_make(ctx, &s->shape, 6, true, NULL, &space), ctx);
   T_OK(contour_objective_new(ctx, &space.b, &o), ctx);
-  contour_objective_set(ctx, &o, &s->data, s->parameters, 1e-12);
+  contour_objective_set(&o, &s->data, s->parameters, 1e-12);
   T_OK(contour_objective_solve(ctx, &o, &space, control), ctx);
   T_RATIO(sqrt(contour_sum(&space.b, control, &s->data, s->parameters) / POINTS), 1e-5,
           "root mean square distance of a sine from two pieces of degree 6 and a tiny one");
@@ -188,12 +188,12 @@ static void test_dense(batten_context *ctx) {
   T_OK(batten_lsq_solve(ctx, 2 * POINTS, u, 1, a, b, &opt, y, NULL), ctx);
   contour_space_expand(&space, y, control[0]);
   T_OK(contour_objective_new(ctx, &space.b, &o), ctx);
-  contour_objective_set(ctx, &o, &s->data, s->parameters, 0);
+  contour_objective_set(&o, &s->data, s->parameters, 0);
   T_OK(contour_objective_solve(ctx, &o, &space, control[1]), ctx);
   for (size_t j = 0; j < 2 * n; j++) worst = fmax(worst, fabs(control[0][j] - control[1][j]));
   T_RATIO(worst, 1e-12, "control points by dense QR");
   s->data.count = 3;
-  contour_objective_set(ctx, &o, &s->data, s->parameters, 0);
+  contour_objective_set(&o, &s->data, s->parameters, 0);
   T_STATUS(contour_objective_solve(ctx, &o, &space, control[1]), BATTEN_E_SINGULAR, ctx, "opt.tension");
   contour_objective_free(ctx, &o);
   contour_space_free(ctx, &space);
@@ -212,7 +212,7 @@ static batten_status solve_one(batten_context *ctx, void *arg) {
   batten_status st = contour_space_make(ctx, &s->shape, 3, true, NULL, &space);
   if (st >= 0) st = contour_objective_new(ctx, &space.b, &o);
   if (st >= 0) {
-    contour_objective_set(ctx, &o, &s->data, s->parameters, 0);
+    contour_objective_set(&o, &s->data, s->parameters, 0);
     st = contour_objective_solve(ctx, &o, &space, control);
   }
   contour_objective_free(ctx, &o);

@@ -38,7 +38,7 @@ static void problem_make(batten_context *ctx, const contour_curve_rule *r, size_
   T_OK(contour_space_make(ctx, &p->c.shape, r->degree, true, NULL, &p->space), ctx);
   T_OK(contour_rows_make(ctx, &p->c.shape, &p->c.b, p->c.control, &OPTIONS, NULL, &accepted, &p->rows), ctx);
   T_OK(contour_objective_new(ctx, &p->c.b, &p->objective), ctx);
-  contour_objective_set(ctx, &p->objective, &p->data, p->parameters, tension);
+  contour_objective_set(&p->objective, &p->data, p->parameters, tension);
   T_OK(contour_objective_solve(ctx, &p->objective, &p->space, p->free), ctx);
 }
 
@@ -284,7 +284,7 @@ static void gap(batten_context *ctx) {
   double *weights = contour_test_memory(1200, 8);
   for (size_t i = 0; i < 1200; i++) weights[i] = i < 120 || i >= 1100 ? 1 : 0;
   p.data.weights = weights;
-  contour_objective_set(ctx, &p.objective, &p.data, p.parameters, 1e-12);
+  contour_objective_set(&p.objective, &p.data, p.parameters, 1e-12);
   T_OK(contour_objective_solve(ctx, &p.objective, &p.space, p.free), ctx);
   contour_program_figures f = {0};
   T_OK(contour_program_solve(ctx, NULL, &p.objective, &p.space, &p.rows, p.free, p.c.control, p.x, &f), ctx);
