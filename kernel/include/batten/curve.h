@@ -118,6 +118,13 @@ BATTEN_API batten_status batten_curve_sample(batten_context *ctx, const batten_c
 BATTEN_API batten_status batten_curve_closest(batten_context *ctx, const batten_curve *curve, size_t count,
                                               const double *points, double *parameters, double *distances);
 
+/* Where the curve crosses or touches itself: *parameters [*count][2], the smaller one first, ascending by it, freed
+ * by batten_free(ctx, *parameters), NULL when there are none. Found by boxes of Bezier pieces and Newton's method to
+ * 1e-12 of the curve's size; pieces that lie on each other give one pair each. The common ends of closed curves do
+ * not count. Fails: INVALID, NOMEM, TOO_LARGE. */
+BATTEN_API batten_status batten_curve_crossings(batten_context *ctx, const batten_curve *curve, size_t *count,
+                                                double (**parameters)[2]);
+
 /* ---- inflections, and the proof of shape -------------------------------------------------------- */
 
 /* Where the curvature changes its sign, corners at knots included: *parameters [*count] ascending, freed by

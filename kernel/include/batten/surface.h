@@ -1,5 +1,5 @@
 /* Tensor-product B-spline surfaces (Bezier patches are those of one span), and what can be asked of them; the proof
- * of convexity among it.
+ * of convexity, and of the signs of sections, among it.
  *
  *   x(u, v) = sum_i sum_j N_i(u) N_j(v) b_ij      (u, v) in [u_0, u_1] x [v_0, v_1]
  *
@@ -145,6 +145,46 @@ typedef struct batten_convexity {
 /* Returns BATTEN_OK whether certified or not. Progress phase "certify". Fails: INVALID, NOMEM, CANCELLED. */
 BATTEN_API batten_status batten_surface_certify_convex(batten_context *ctx, const batten_surface *surface,
                                                        const batten_convexity_options *opt, batten_convexity *out);
+
+/* ---- the proof that sections keep their sign ---------------------------------------------------- */
+
+/* Of surfaces whose sections v = const are plane, in parallel planes. With n the planes' normal, a section bends to
+ * the left where w = n . (x_u x x_uu) > 0; its curvature is w / |x_u|^3. On each span pair of which a sign is wanted,
+ * subdivided as need be, the Bernstein coefficients of w must have it by more than all rounding errors together. At
+ * an end of the span in u where both end sections have x_uu = 0 to the rounding of the control points (2^-50 of the
+ * largest coordinate), and there alone, w may vanish and have the wrong sign by what that rounding explains. Knows
+ * nothing of how the surface was made. */
+typedef struct batten_sections_options {
+  size_t struct_size;
+  double normal[3];         /* of the planes, any length. Default (0, 0, 1). */
+  const signed char *signs; /* [span pairs in u][in v] wanted: +1, -1; 0 nothing. NULL: where both end sections of a
+                               span pair (at its least and its largest v) are proven to have one and the same sign on
+                               the closed span, but at ends where both have x_uu = 0, that sign; else nothing. Default
+                               NULL. */
+  unsigned depth_max;       /* bisections in each direction, 0 .. 30. Default 20. */
+  size_t box_limit;         /* boxes at most for a span pair, >= 1. Default 100000. */
+} batten_sections_options;
+BATTEN_API batten_sections_options batten_sections_options_default(void);
+
+typedef struct batten_sections {
+  int certified;      /* non-zero: all wanted signs are proven */
+  size_t pairs;       /* span pairs of which a sign was wanted */
+  size_t pairs_free;  /* others */
+  size_t violations;  /* where a wrong sign was met, or 0 and no flat point explains it */
+  size_t unproven;    /* neither that nor proven: depth_max or box_limit ended the search */
+  double margin_min;  /* of span pairs without flat points at their ends: with sigma the sign, sigma curvature >=
+                         margin_min is proven, 1 / unit, at least nine tenths of the least there is; NaN when there are
+                         none. Not certified: the least that was met, of all */
+  double worst_at[2]; /* (u, v) where the least was met */
+  size_t boxes;       /* that were looked at */
+  unsigned depth;     /* bisections of the smallest */
+} batten_sections;
+/* verdicts: NULL, or [span pairs in u][in v]: 1 proven, 0 not wanted, -1 violated, -2 unproven. On the context's
+ * threads, same bits for any number. Progress phase "certify". Returns BATTEN_OK whether certified or not. Fails:
+ * INVALID (sections that are not plane: names the control point; signs), NOMEM, TOO_LARGE, CANCELLED. */
+BATTEN_API batten_status batten_surface_certify_sections(batten_context *ctx, const batten_surface *surface,
+                                                         const batten_sections_options *opt, batten_sections *out,
+                                                         signed char *verdicts);
 
 #ifdef __cplusplus
 }
