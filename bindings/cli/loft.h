@@ -1,0 +1,33 @@
+/* What the parts of `batten loft` share. */
+#ifndef BATTEN_CLI_LOFT_H
+#define BATTEN_CLI_LOFT_H
+
+#include "cli.h"
+
+/* ---- loft_picture.c ------------------------------------------------------------------------------ */
+
+/* What is drawn: contours, and the patches between them with u = t, v = height, of one span in v, as
+ * batten_loft_patch gives them. */
+typedef struct loft_scene {
+  size_t contour_count; /* >= 2 */
+  const batten_curve *const *contours;
+  const double *heights;                      /* [contour_count] ascending */
+  const batten_surface *const *patches;       /* [contour_count - 1] */
+  const batten_surface *const *unconstrained; /* [contour_count - 1] the same without inequalities, drawn above the
+                                                 result; NULL: none */
+  const batten_plane *base; /* where the heights begin: (x, y, z) is drawn at origin + x axes[0] + y axes[1] + z
+                               (axes[0] x axes[1]); NULL: as they are */
+  double height_scale;      /* heights are drawn so many times larger; 0 = as is, unless the stack is so low or so
+                               high beside its contours that nothing could be told apart; then the caption says it */
+} loft_scene;
+
+/* After figure 5 of the paper: the control polygons of the sections, with the control points of their trajectories in
+ * grey; the contours and sections between them, with the control polygons of the contours in grey; the surface, blue
+ * where its Gaussian curvature is positive, red where it is negative; the surface in the same colours by the curvature
+ * of its sections. Two rows and two columns; with unconstrained two rows and four columns.
+ *   view  size, camera, up_axis and title of the picture; its other fields do not count
+ *   path  .png */
+batten_status loft_draw(batten_context *ctx, const loft_scene *scene, const batten_picture_options *view,
+                        const char *path);
+
+#endif
