@@ -18,6 +18,7 @@
  * measure.c      what the surface leaves of interpolation and continuity, from the patches alone
  *
  * loft.c         the handle: patches, whole surface, sections
+ * volume.c       area and volume
  * match*.c       batten_loft_match
  *
  * In all of it points are scaled to a box of size about 1 around 0 and heights to gaps of about 1 (both by powers of

@@ -123,6 +123,15 @@ BATTEN_API batten_status batten_loft_surface(batten_context *ctx, const batten_l
 BATTEN_API batten_status batten_loft_section(batten_context *ctx, const batten_loft *loft, double z,
                                              batten_curve **out);
 
+typedef struct batten_loft_measures {
+  double area;   /* of the surface itself, without ends, caller's unit^2 */
+  double volume; /* closed: between the surface and the planes of its first and last contour, caller's unit^3,
+                    positive where contours run counter-clockwise; open: NaN */
+} batten_loft_measures;
+/* By quadrature, to 1e-9 or so where the surface is regular; the volume to rounding. Progress phase "measure". Fails:
+ * INVALID, CANCELLED. */
+BATTEN_API batten_status batten_loft_measure(batten_context *ctx, const batten_loft *loft, batten_loft_measures *out);
+
 typedef enum batten_loft_remark {
   BATTEN_LOFT_UNMATCHED = 1, /* inflection of `contour` at t without a partner in contour `other` */
   BATTEN_LOFT_NOT_FLAT = 2,  /* inflection of `contour` at t where x'' is not 0 */
