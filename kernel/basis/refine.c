@@ -48,11 +48,29 @@ typedef struct surroundings {
   size_t up_to, low, below, high;
 } surroundings;
 
-/* The blossom of the old curve at arguments [degree] in rising order. */
-static void insert(const bspline *from, unsigned dim, const double *points, const surroundings *s,
-                   const double *arguments, double *out) {
+/* The walk on to new control point j; from one to the next all rise. */
+typedef struct walk {
+  surroundings at;
+  size_t below_before, up_to_behind;
+} walk;
+
+static void step(const bspline *from, const bspline *to, size_t j, walk *w) {
+  surroundings *s = &w->at;
+  s->before = to->knots[j];
+  s->behind = to->knots[j + to->degree + 1];
+  w->below_before = count_below(from, w->below_before, s->before);
+  s->up_to = count_up_to(from, s->up_to, s->before);
+  s->below = count_below(from, s->below, s->behind);
+  w->up_to_behind = count_up_to(from, w->up_to_behind, s->behind);
+  s->low = s->up_to - w->below_before;
+  s->high = w->up_to_behind - s->below;
+}
+
+/* Of arguments [degree] in rising order those that are no knots of the old curve: fresh. Returns how many, and the
+ * first of the one more old control points that the blossom there is made of. */
+static unsigned find_fresh(const bspline *from, const surroundings *s, const double *arguments,
+                           double fresh[BSPLINE_DEGREE], size_t *first) {
   unsigned d = from->degree;
-  double fresh[BSPLINE_DEGREE], work[BSPLINE_ORDER * DIM_MAX];
   size_t low = 0, high = 0;
   for (unsigned k = 0; k < d; k++) {
     low += arguments[k] == s->before;
@@ -70,7 +88,16 @@ static void insert(const bspline *from, unsigned dim, const double *points, cons
   }
   assert(next == end);
   assert(start > rounds && start - 1 < from->count);
-  size_t first = start - 1 - rounds; /* i + m - d, as t_(i + 1) is knot `start` and m = d - rounds */
+  *first = start - 1 - rounds; /* i + m - d, as t_(i + 1) is knot `start` and m = d - rounds */
+  return rounds;
+}
+
+/* The blossom of the old curve at arguments [degree] in rising order. */
+static void insert(const bspline *from, unsigned dim, const double *points, const surroundings *s,
+                   const double *arguments, double *out) {
+  double fresh[BSPLINE_DEGREE], work[BSPLINE_ORDER * DIM_MAX];
+  size_t first;
+  unsigned rounds = find_fresh(from, s, arguments, fresh, &first);
   for (unsigned k = 0; k < (rounds + 1) * dim; k++) work[k] = points[first * dim + k];
   run_rounds(from, dim, first, rounds, fresh, work);
   for (unsigned x = 0; x < dim; x++) out[x] = work[x];
@@ -105,19 +132,30 @@ static void insert_mean(const bspline *from, unsigned dim, const double *points,
 
 void bspline_refine(const bspline *from, unsigned dim, const double *points, const bspline *to, double *out) {
   assert(from->degree >= 1 && to->degree <= BSPLINE_DEGREE && from->degree <= to->degree && dim <= DIM_MAX);
-  unsigned degree = to->degree;
-  surroundings s = {.up_to = 0};
-  size_t below_before = 0, up_to_behind = 0;
+  walk w = {.below_before = 0};
   for (size_t j = 0; j < to->count; j++) {
-    s.before = to->knots[j];
-    s.behind = to->knots[j + degree + 1];
-    below_before = count_below(from, below_before, s.before);
-    s.up_to = count_up_to(from, s.up_to, s.before);
-    s.below = count_below(from, s.below, s.behind);
-    up_to_behind = count_up_to(from, up_to_behind, s.behind);
-    s.low = s.up_to - below_before;
-    s.high = up_to_behind - s.below;
-    insert_mean(from, dim, points, &s, degree, to->knots + j + 1, out + j * dim);
+    step(from, to, j, &w);
+    insert_mean(from, dim, points, &w.at, to->degree, to->knots + j + 1, out + j * dim);
+  }
+}
+
+void bspline_insertion(const bspline *from, const bspline *to, size_t *first, double *rows) {
+  unsigned d = from->degree;
+  assert(d >= 1 && to->degree == d && d <= BSPLINE_DEGREE);
+  walk w = {.below_before = 0};
+  for (size_t j = 0; j < to->count; j++, rows += d + 1) {
+    double fresh[BSPLINE_DEGREE];
+    step(from, to, j, &w);
+    unsigned rounds = find_fresh(from, &w.at, to->knots + j + 1, fresh, &first[j]);
+    for (unsigned k = 0; k <= d; k++) rows[k] = k == 0;
+    /* The triangle from its tip: each round hands the weights of what it makes to what it is made of. */
+    for (unsigned round = rounds; round-- > 0;)
+      for (unsigned k = rounds - round; k-- > 0;) {
+        size_t right = first[j] + k + 1 + d, left = first[j] + k + 1 + round;
+        double start = from->knots[left], part = (fresh[round] - start) / (from->knots[right] - start);
+        rows[k + 1] += part * rows[k];
+        rows[k] *= 1 - part;
+      }
   }
 }
 

@@ -14,6 +14,12 @@ static inline double bspline_blend(double a, double b, double part) {
  * subsets for elevation. All combinations are convex; control points that stay are copied to the bit. */
 void bspline_refine(const bspline *from, unsigned dim, const double *points, const bspline *to, double *out);
 
+/* The same for one degree as rows: control point j of `to` is the sum of rows[j][k] times control point first[j] + k
+ * of from, k = 0 .. degree; rows [to->count][degree + 1] are not negative and have sum 1, points that stay have one
+ * entry 1, and what is 0 at the end of a row may stand for points that are not there. `to` may also be a part of
+ * from: its knots within from's, which need not be clamped, every one of from between its ends as often at least. */
+void bspline_insertion(const bspline *from, const bspline *to, size_t *first, double *rows);
+
 /* The polygon's value of the blossom of span mu at arguments [degree]: out [dim]. */
 void bspline_blossom(const bspline *b, unsigned dim, const double *points, size_t mu, const double *arguments,
                      double *out);
