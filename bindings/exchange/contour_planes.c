@@ -182,3 +182,5 @@ batten_status bx_find_planes(bx_reader *r, size_t count, const size_t *starts, c
   }
   return st;
 }
+
+batten_plane bx_station_plane(double station) { return coordinate_plane(0, station); }

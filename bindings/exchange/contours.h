@@ -12,4 +12,13 @@
 batten_status bx_find_planes(bx_reader *r, size_t count, const size_t *starts, const double *points, double *out,
                              batten_plane *planes);
 
+/* Sections of a hull from a table of offsets: rows [count][width] begin with station x, half-breadth y, waterline z,
+ * in any order. order [count] becomes the rows that stay, section by section, and starts [count + 1] where these
+ * begin; *sections. See batten_read_contours for what is left out. FORMAT: no section stays. */
+batten_status bx_arrange_offsets(bx_reader *r, size_t count, const double *rows, size_t width, size_t *order,
+                                 size_t *starts, size_t *sections);
+
+/* The plane x = station, y and z as its axes. */
+batten_plane bx_station_plane(double station);
+
 #endif

@@ -1,7 +1,7 @@
 /* Contours from text: rows as text_table.c gives them, told apart by lines "contour N", by a column or by blank
- * lines.
+ * lines. Which of these it is, the first that is met decides; blank lines mean nothing with the others.
  *
- * Which of these it is, the first that is met decides; blank lines mean nothing with the others. */
+ * Tables of offsets are parted by their stations, and by nothing else. */
 #include "contours.h"
 #include "format.h"
 #include "names.h"
@@ -60,6 +60,8 @@ static batten_status take_head(sequences *s) {
   bx_reader *r = s->table.r;
   const char *number = s->table.head;
   int64_t count = 0;
+  if (s->table.offsets)
+    return bx_fail_line(r, "a line 'contour' in a table of offsets, which its stations part; remove it");
   batten_status st = check_complete(s);
   if (st == BATTEN_OK) st = bx_next_integer(r, &number, "the number of points", &count);
   if (st != BATTEN_OK) return st;
@@ -78,6 +80,7 @@ static batten_status take_head(sequences *s) {
 /* Which contour the row belongs to. */
 static batten_status place_row(sequences *s) {
   bx_table *t = &s->table;
+  if (t->offsets) return BATTEN_OK;
   if (bx_table_has(t, BX_CONTOUR)) {
     if (s->has_heads)
       return bx_fail_line(t->r, "a column 'contour' and lines 'contour N' at once; leave out one of them");
@@ -190,20 +193,27 @@ static void sort_rows(const sequences *s, size_t *order, size_t *starts) {
 }
 
 /* A column of the rows, or some, in the order of the contours: [count][columns]. */
-static batten_status take_columns(const sequences *s, const size_t *order, size_t first, size_t columns,
+static batten_status take_columns(const sequences *s, size_t count, const size_t *order, size_t first, size_t columns,
                                   double **out) {
-  *out = batten_alloc_array(s->ctx, s->count, columns * sizeof **out);
+  *out = batten_alloc_array(s->ctx, count, columns * sizeof **out);
   if (!*out) return BATTEN_E_NOMEM;
-  for (size_t i = 0; i < s->count; i++)
+  for (size_t i = 0; i < count; i++)
     memcpy(*out + i * columns, s->rows + order[i] * s->width + first, columns * sizeof **out);
   return BATTEN_OK;
 }
 
 static batten_status take_points(const sequences *s, const size_t *order, batten_contours *out) {
-  if (s->n == 2) return take_columns(s, order, 0, 2, &out->points);
+  size_t count = out->starts[out->count];
+  if (s->n == 2) return take_columns(s, count, order, 0, 2, &out->points);
+  if (s->table.offsets) {
+    out->planes = batten_alloc_array(s->ctx, out->count, sizeof *out->planes);
+    for (size_t i = 0; out->planes && i < out->count; i++)
+      out->planes[i] = bx_station_plane(s->rows[order[out->starts[i]] * s->width]);
+    return out->planes ? take_columns(s, count, order, 1, 2, &out->points) : BATTEN_E_NOMEM;
+  }
   double *space = NULL;
-  batten_status st = take_columns(s, order, 0, 3, &space);
-  out->points = batten_alloc_array(s->ctx, s->count, 2 * sizeof *out->points);
+  batten_status st = take_columns(s, count, order, 0, 3, &space);
+  out->points = batten_alloc_array(s->ctx, count, 2 * sizeof *out->points);
   out->planes = batten_alloc_array(s->ctx, s->contours, sizeof *out->planes);
   if (st == BATTEN_OK && (!out->points || !out->planes)) st = BATTEN_E_NOMEM;
   if (st == BATTEN_OK) st = bx_find_planes(s->table.r, s->contours, out->starts, space, out->points, out->planes);
@@ -216,12 +226,17 @@ static batten_status finish(const sequences *s, batten_contours *out) {
   batten_contours c = {.count = s->contours};
   batten_status st = BATTEN_E_NOMEM;
   size_t *order = batten_alloc_array(s->ctx, s->count, sizeof *order), column = s->n;
-  c.starts = batten_alloc_array(s->ctx, s->contours + 1, sizeof *c.starts);
+  c.starts = batten_alloc_array(s->ctx, (t->offsets ? s->count : s->contours) + 1, sizeof *c.starts);
   if (!order || !c.starts) goto done;
-  sort_rows(s, order, c.starts);
-  st = take_points(s, order, &c);
-  if (st == BATTEN_OK && bx_table_has(t, BX_T)) st = take_columns(s, order, column++, 1, &c.parameters);
-  if (st == BATTEN_OK && bx_table_has(t, BX_W)) st = take_columns(s, order, column, 1, &c.weights);
+  st = BATTEN_OK;
+  if (t->offsets)
+    st = bx_arrange_offsets(t->r, s->count, s->rows, s->width, order, c.starts, &c.count);
+  else
+    sort_rows(s, order, c.starts);
+  if (st == BATTEN_OK) st = take_points(s, order, &c);
+  size_t count = st == BATTEN_OK ? c.starts[c.count] : 0;
+  if (st == BATTEN_OK && bx_table_has(t, BX_T)) st = take_columns(s, count, order, column++, 1, &c.parameters);
+  if (st == BATTEN_OK && bx_table_has(t, BX_W)) st = take_columns(s, count, order, column, 1, &c.weights);
 done:
   batten_free(s->ctx, order);
   if (st == BATTEN_OK)
@@ -232,13 +247,13 @@ done:
 }
 
 batten_status bx_read_contours_from(bx_reader *r, batten_contours *out) {
-  sequences s = {
-      .ctx = r->ctx,
-      .names = {.ctx = r->ctx},
-      .table = {.r = r,
-                .wanted = 1u << BX_X | 1u << BX_Y | 1u << BX_Z | 1u << BX_W | 1u << BX_T | 1u << BX_CONTOUR,
-                .names = "x y z t w contour",
-                .may_have_title = bx_has_extension(r->path, "dat")}};
+  sequences s = {.ctx = r->ctx,
+                 .names = {.ctx = r->ctx},
+                 .table = {.r = r,
+                           .wanted = 1u << BX_X | 1u << BX_Y | 1u << BX_Z | 1u << BX_W | 1u << BX_T |
+                                     1u << BX_CONTOUR | 1u << BX_STATION | 1u << BX_HALF_BREADTH | 1u << BX_WATERLINE,
+                           .names = "x y z t w contour",
+                           .may_have_title = bx_has_extension(r->path, "dat")}};
   bool end;
   batten_status st = bx_next_line(r, &end);
   while (st == BATTEN_OK && !end) {

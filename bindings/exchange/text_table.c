@@ -70,7 +70,13 @@ static int role_of(bx_field f) {
                {"t", BX_T},
                {"parameter", BX_T},
                {"contour", BX_CONTOUR},
-               {"curve", BX_CONTOUR}};
+               {"curve", BX_CONTOUR},
+               {"station", BX_STATION},
+               {"half_breadth", BX_HALF_BREADTH},
+               {"half-breadth", BX_HALF_BREADTH},
+               {"half breadth", BX_HALF_BREADTH},
+               {"halfbreadth", BX_HALF_BREADTH},
+               {"waterline", BX_WATERLINE}};
   while (f.length && (*f.text == '"' || *f.text == '\'')) f = (bx_field){f.text + 1, f.length - 1};
   for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
     const char *name = names[i].name;
@@ -80,6 +86,22 @@ static int role_of(bx_field f) {
     if (ends) return (int)names[i].role;
   }
   return -1;
+}
+
+/* Half-breadths y over stations x and waterlines z: their names say that it is a table of offsets, in which x and z
+ * may have their plain names, and y has where the other two say it. x and z are taken before stations and waterlines,
+ * which may be their numbers. */
+static bool resolve_offsets(int column_of[BX_ROLES]) {
+  static const bx_role plain[3] = {BX_X, BX_Y, BX_Z}, own[3] = {BX_STATION, BX_HALF_BREADTH, BX_WATERLINE};
+  bool offsets = column_of[BX_HALF_BREADTH] >= 0 || (column_of[BX_STATION] >= 0 && column_of[BX_WATERLINE] >= 0);
+  int found[3];
+  for (int k = 0; k < 3; k++) {
+    bool own_first = plain[k] == BX_Y ? column_of[own[k]] >= 0 : column_of[plain[k]] < 0;
+    found[k] = column_of[own_first ? own[k] : plain[k]];
+    offsets = offsets && found[k] >= 0;
+  }
+  for (int k = 0; offsets && k < 3; k++) column_of[plain[k]] = found[k];
+  return offsets;
 }
 
 /* Reads names; false when x and y are not among them. */
@@ -93,10 +115,14 @@ static bool take_names(bx_table *t, const char *line, size_t length) {
     int role = role_of(f);
     if (role >= 0 && t->wanted >> role & 1 && column_of[role] < 0) column_of[role] = (int)column;
   }
+  bool offsets = resolve_offsets(column_of);
+  t->half_breadths = column_of[BX_HALF_BREADTH] >= 0;
   if (column_of[BX_X] < 0 || column_of[BX_Y] < 0) return false;
   if (column_of[BX_U] < 0 || column_of[BX_V] < 0) column_of[BX_U] = column_of[BX_V] = -1; /* alone: something else */
   memcpy(t->column_of, column_of, sizeof column_of);
+  for (int role = BX_STATION; role <= BX_WATERLINE; role++) t->column_of[role] = -1;
   t->named = true;
+  t->offsets = offsets;
   t->named_columns = column;
   return true;
 }
@@ -141,7 +167,7 @@ static batten_status begin_numbers(bx_table *t, const char *line, size_t length)
   t->columns = count_fields(line, length, t->separator);
   if (t->columns > COLUMNS_MAX)
     return bx_fail_line(t->r, "%zu columns; at most %d are read", t->columns, COLUMNS_MAX);
-  if (t->named && t->names_in_comment && t->named_columns != t->columns) t->named = false;
+  if (t->named && t->names_in_comment && t->named_columns != t->columns) t->named = t->offsets = false;
   if (t->named && t->named_columns != t->columns)
     return bx_fail_line(t->r, "%zu columns, but the header names %zu", t->columns, t->named_columns);
   return t->named ? BATTEN_OK : choose_roles(t);
@@ -224,6 +250,11 @@ batten_status bx_table_take(bx_table *t, bx_line *out) {
       *out = BX_LINE_COMMENT;
       return BATTEN_OK;
     }
+    if (!names && t->half_breadths)
+      return bx_fail_line(t->r,
+                          "the header '%s' names half-breadths, but not both of station (or x) and waterline (or "
+                          "z); add them",
+                          bx_quote(line, length, quote));
     if (!names)
       return bx_fail_line(t->r, "the header '%s' names no columns x and y; rename them, or remove the line",
                           bx_quote(line, length, quote));

@@ -3,7 +3,9 @@
  * The separator is what the first line of a kind (names, numbers) uses: semicolons, else commas, else blanks. Without
  * names the number of columns decides: 2 = x y, 3 = x y z and, where normals are wanted, 4 = x y nx ny, 6 = x y z nx
  * ny nz. Names may also stand in a comment above the first numbers ("# x y z nx ny nz", "//X Y Z R G B"); columns
- * with other names are skipped. # % // begin comments. */
+ * with other names are skipped. # % // begin comments.
+ *
+ * Tables of offsets (hulls of ships) name half-breadths, stations and waterlines: these become y, x and z. */
 #ifndef BATTEN_EXCHANGE_TEXT_TABLE_H
 #define BATTEN_EXCHANGE_TEXT_TABLE_H
 
@@ -22,6 +24,9 @@ typedef enum bx_role {
   BX_W,
   BX_T,
   BX_CONTOUR, /* a text */
+  BX_STATION, /* these three stand for x, y and z when they have been found */
+  BX_HALF_BREADTH,
+  BX_WATERLINE,
   BX_ROLES
 } bx_role;
 
@@ -46,6 +51,8 @@ typedef struct bx_table {
   /* inside */
   char separator;        /* of the numbers */
   bool named;            /* columns come from names */
+  bool offsets;          /* of a table of offsets */
+  bool half_breadths;    /* the last names had them */
   bool names_in_comment; /* which count only when they fit the numbers */
   size_t named_columns;
 } bx_table;

@@ -1,4 +1,5 @@
-/* Contours in text: how they are parted, columns, planes in space, what is refused and where, real data. */
+/* Contours in text: how they are parted, columns, tables of offsets, planes in space, what is refused and where, real
+ * data. */
 #include "files.h"
 
 static batten_status read_bytes(batten_context *ctx, const char *name, const void *bytes, size_t size,
@@ -133,6 +134,73 @@ static void test_many(batten_context *ctx) {
   free(text);
 }
 
+/* ---- tables of offsets ------------------------------------------------------------------------------- */
+
+/* Two stations of two points each, (0, 1) (2, 3) in x = 5 and (0, 2) (4, 3) in x = 7, whatever the table is like. */
+static void test_offsets(batten_context *ctx) {
+  static const double points[] = {0, 1, 2, 3, 0, 2, 4, 3};
+  static const size_t two[] = {0, 2, 4, SIZE_MAX};
+  static const char *const tables[] = {
+      "x_m,z_m,half_breadth_m\n5,1,0\n5,3,2\n7,2,0\n7,3,4\n",
+      "x_m,z_m,half_breadth_m\n7,3,4\n7,2,0\n\n5,3,2\n5,1,0\n", /* from the bow and the deck; blank lines do not part
+                                                                 */
+      "x_m;z_m;\"half-breadth [m]\"\n5;1;0\n7;2;0\n\n5;3;2\n7;3;4\n", /* waterline by waterline */
+      "station,waterline,y\n7,2,0\n5,3,2\n5,1,0\n7,3,4\n",
+      "Waterline HalfBreadth Station\n1 0 5\n3 2 5\n2 0 7\n3 4 7\n",
+      "# station z half_breadth\n5 1 0\n5 3 2\n7 2 0\n7 3 4\n",
+      "station,x,waterline,z,y,half_breadth\n1,5,1,1,9,0\n1,5,2,3,9,2\n2,7,1,2,9,0\n2,7,3,3,9,4\n", /* their numbers,
+                                                                                                       too */
+      "x,z,half_breadth\n5,-1,0\n5,0,0\n5,1,0\n5,3,2\n7,0,0\n7,2,0\n7,3,4\n8,0,0\n8,1,0\n9,5,1\n4,2,2\n4,2,2\n",
+  };
+  for (size_t i = 0; i < sizeof tables / sizeof *tables; i++) {
+    batten_contours c = read_good(ctx, tables[i]);
+    T_CHECK(c.count && has(&c, two, points) && c.planes && c.planes[0].origin[0] == 5 && c.planes[1].origin[0] == 7 &&
+                c.planes[0].origin[1] == 0 && c.planes[0].axes[0][1] == 1 && c.planes[1].axes[1][2] == 1,
+            "offsets %zu: %zu stations", i, c.count);
+    batten_contours_free(ctx, &c);
+  }
+  /* a bulb under a bow: the middle between them stays, that above the deck does not */
+  static const double bulb[] = {0, 1, 1, 2, 0, 3, 0, 4, 2, 5, 0, 6};
+  static const size_t one[] = {0, 6, SIZE_MAX};
+  batten_contours c =
+      read_good(ctx, "x z half_breadth w\n5 0 0 1\n5 1 0 2\n5 2 1 3\n5 3 0 4\n5 4 0 5\n5 5 2 6\n5 6 0 7\n5 7 0 8\n");
+  T_CHECK(c.count && has(&c, one, bulb) && c.weights && c.weights[0] == 2 && c.weights[5] == 7,
+          "zeros between points stay, those at the ends do not; weights follow their points");
+  batten_contours_free(ctx, &c);
+  c = read_good(ctx, "x,z,half_breadth\n1,0,2\n1,0,0\n1,1,2\n");
+  T_CHECK(c.count == 1 && c.points[0] == 2 && c.points[2] == 0, "rows of one waterline keep their order");
+  batten_contours_free(ctx, &c);
+  c = read_good(ctx, "x,y,half_breadth\n1,2,3\n4,5,6\n");
+  T_CHECK(c.count == 1 && !c.planes && c.points[3] == 5, "without waterlines it is a plane contour");
+  batten_contours_free(ctx, &c);
+}
+
+static void test_gunnerus(batten_context *ctx) {
+  char path[400];
+  const char *shared = getenv("BATTEN_SHARED");
+  snprintf(path, sizeof path, "%s/data/hulls/gunnerus_offsets.csv", shared ? shared : "none");
+  if (access(path, R_OK)) {
+    printf("# skipped: no %s\n", path);
+    return;
+  }
+  batten_contours c = {0};
+  T_OK(batten_read_contours(ctx, path, &c), ctx);
+  bool ascending = c.count > 0;
+  double widest = 0;
+  for (size_t i = 0; i < c.count; i++) {
+    if (i > 0) ascending = ascending && c.planes[i].origin[0] > c.planes[i - 1].origin[0];
+    for (size_t k = c.starts[i]; k < c.starts[i + 1]; k++) {
+      widest = fmax(widest, c.points[2 * k]);
+      if (k > c.starts[i]) ascending = ascending && c.points[2 * k + 1] > c.points[2 * k - 1];
+    }
+  }
+  printf("# %zu stations, %zu points\n", c.count, c.starts[c.count]);
+  T_CHECK(c.count == 63 && c.planes[0].origin[0] == 0 && c.planes[62].origin[0] == 35.96 && ascending &&
+              c.points[0] == 0 && c.points[1] == 1.5 && fabs(widest - 4.8051) < 1e-12,
+          "a hull of %zu stations, half as wide as %g", c.count, widest);
+  batten_contours_free(ctx, &c);
+}
+
 /* ---- planes ------------------------------------------------------------------------------------------ */
 
 static double dot(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
@@ -249,6 +317,14 @@ static void test_refused(batten_context *ctx) {
       {"x,y,t,w\n1,2,,3\n", "a.txt:2: column 3 is missing"},
       {"contour,x,y\n,1,2\n", "a.txt:2: column 1 is missing"},
       {"a,b\n1,2\n", "a.txt:1: the header 'a,b' names no columns x and y"},
+      {"z,half_breadth\n1,2\n",
+       "a.txt:1: the header 'z,half_breadth' names half-breadths, but not both of station (or x) and waterline (or "
+       "z); "
+       "add them"},
+      {"station,waterline\n1,2\n", "a.txt:1: the header 'station,waterline' names no columns x and y"},
+      {"x,z,half_breadth\ncontour 1\n1,2,3\n",
+       "a.txt:2: a line 'contour' in a table of offsets, which its stations "},
+      {"x,z,half_breadth\n1,2,3\n1,2,3\n2,0,0\n2,1,0\n", "a.txt: offsets: no station has two different points"},
       {"contour 3\n1 2\n3 4\n", "'contour 3' in line 1 says how many points follow, but there are 2"},
       {"contour 3\n1 2\n3 4\ncontour 1\n5 6\n", "a.txt:4: 'contour 3' in line 1 says how many points follow"},
       {"contour 1\n1 2\n3 4\n", "a.txt:3: more points than 'contour 1' in line 1 says"},
@@ -295,11 +371,15 @@ static batten_status read_again(batten_context *ctx, void *arg) {
 }
 
 static void test_failures(scratch *s) {
+  static const char offsets[] = "x,z,half_breadth,w\n5,1,0,1\n5,3,2,1\n7,2,0,1\n7,3,4,1\n";
   static const char column[] = "contour,x,y,z,t,w\na,1,2,3,4,5\nb,2,3,3,5,6\na,4,5,6,7,8\n";
   char path[400];
   snprintf(path, sizeof path, "%s", scratch_file(s, "column.csv"));
   file_write(path, column, strlen(column));
   t_fail_every_allocation("a column", read_again, path);
+  snprintf(path, sizeof path, "%s", scratch_file(s, "offsets.csv"));
+  file_write(path, offsets, strlen(offsets));
+  t_fail_every_allocation("offsets", read_again, path);
   snprintf(path, sizeof path, "%s", scratch_file(s, "heads.txt"));
   FILE *f = fopen(path, "w");
   for (int c = 0; c < 70; c++) fprintf(f, "contour 2\n%d 2 3\n4 %d 3\n", c, c);
@@ -342,11 +422,13 @@ int main(void) {
   test_title(ctx);
   test_surfaces(ctx);
   test_many(ctx);
+  test_offsets(ctx);
   test_constant(ctx);
   test_oblique(ctx);
   test_refused(ctx);
   test_failures(&s);
   test_heart(ctx);
+  test_gunnerus(ctx);
   scratch_close(&s);
   T_CHECK(batten_bytes_in_use(ctx) == 0, "all is released");
   batten_context_free(ctx);

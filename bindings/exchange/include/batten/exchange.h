@@ -213,6 +213,22 @@ typedef struct batten_plane {
   double origin[3], axes[2][3];
 } batten_plane;
 
+/* Where one of several parallel planes lies over a common base: its point (x, y) is matrix (x, y) + shift of the base
+ * (as batten_curve_transform takes them) at that height. */
+typedef struct batten_plane_place {
+  double height, matrix[4], shift[2]; /* matrix row-major; the identity to the bit where axes are equal */
+} batten_plane_place;
+/* Parallel planes [count] (also those that face each other) as heights: *base has the axes of the first one, and of
+ * its origins the one that is nearest to that of space; point (x, y) at a height is origin + x axes[0] + y axes[1] +
+ * height (axes[0] x axes[1]). So of planes x, y or z = const all numbers stay, but that heights are -y. places [count]
+ * as the planes come, in no order of heights. Fails: INVALID (planes turned by more than 1e-5 radians against the
+ * first, named). */
+BATTEN_API batten_status batten_plane_stack(batten_context *ctx, size_t count, const batten_plane *planes,
+                                            batten_plane *base, batten_plane_place *places);
+/* A surface of points (x, y, height) over a base, in space. Fails: INVALID, NOMEM. */
+BATTEN_API batten_status batten_plane_lift(batten_context *ctx, const batten_plane *base, const batten_surface *surface,
+                                           batten_surface **out);
+
 /* Sequences of points, each in a plane. */
 typedef struct batten_contours {
   size_t count;
@@ -229,6 +245,11 @@ typedef struct batten_contours {
  *   (its number or name; rows of one contour need not be neighbours) are taken. A .dat whose first numbers are as
  *   many points as two surfaces of an airfoil have (Lednicer's tables: each from the nose) becomes one contour from
  *   the trailing edge along the first surface to the nose and back along the second.
+ *   or a table of offsets of a hull: with names of which one is half_breadth (half-breadth, halfbreadth) with x or
+ *   station and z or waterline, or which are station, y and waterline; also x_m, "half-breadth [m]" and so on. Each
+ *   station is an open contour of points (half-breadth, waterline) in its plane x = station, by ascending stations and
+ *   waterlines, whatever the order of the rows is. Of half-breadths 0 that follow each other at the lower or upper end
+ *   of a station only the one next to the hull stays; stations with fewer than two different points are left out.
  * Numbers are taken as they are: whether contours are closed is for the caller to know, who may find the first point
  * once more at the end. Points with z lie in one plane for each contour, to 1e-6 of its longest side. Where a
  * coordinate is constant, in all contours if there is one, the plane's axes are the other two in the order x y, x z,
