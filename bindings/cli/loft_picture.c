@@ -388,8 +388,8 @@ static batten_picture_lines kind(const convex_segments *s, unsigned rgb, double 
 
 /* Stacks of many contours are drawn with finer lines. */
 static double line_share(const drawing *d) {
-  double many = (double)(d->scene->contour_count + d->between * (d->scene->contour_count - 1));
-  return fmax(0.4, fmin(1, sqrt(24 / many)));
+  double many = (double)d->scene->contour_count;
+  return fmax(0.2, fmin(1, sqrt(16 / many)));
 }
 
 static void describe(const drawing *d, const side *s, unsigned which, const char *name, panel *p) {
@@ -399,15 +399,15 @@ static void describe(const drawing *d, const side *s, unsigned which, const char
   batten_picture_options *o = &p->options;
   *o = batten_picture_options_default();
   if (which == 0) {
-    p->lines[0] = kind(&s->dots, 0x8f959d, 6 * w, 0.7);
-    p->lines[1] = kind(&s->polygons, 0x24466f, 1.5 * w, 0.6);
+    p->lines[0] = kind(&s->dots, 0x8f959d, fmax(2, 6 * w), 0.7);
+    p->lines[1] = kind(&s->polygons, 0x24466f, fmax(0.8, 1.5 * w), 0.6);
     p->lines[2] = p->lines[3] = kind(&d->data, 0x000000, 5 * w, 0.7); /* twice: lines are a little transparent */
   } else if (which == 1) {
     p->lines[0] = kind(&d->data, 0x7d848d, 2.6 * w, 0.6);
-    p->lines[1] = kind(&s->sections, 0x24466f, 1.5 * w, 0.4);
+    p->lines[1] = kind(&s->sections, 0x24466f, fmax(0.8, 1.5 * w), 0.4);
     p->lines[2] = p->lines[3] = kind(&d->contours, 0x000000, 4 * w, 0.3);
   } else {
-    p->lines[0] = kind(&d->contours, 0x000000, 2.4 * w, 0.2);
+    p->lines[0] = kind(&d->contours, 0x000000, 2.4 * w * w, 0.2);
     if (which == 3) p->lines[1] = (batten_picture_lines){s->level_count, s->levels, 0xb01010, 2, 0};
     o->colors = s->tones[which - 2];
     o->color_map = BATTEN_MAP_PARTED;
