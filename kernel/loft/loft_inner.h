@@ -200,9 +200,9 @@ void loft_net_expand(const loft_net *net, const double *y, double *control);
 /* Leg v of patch i at part zeta of its height: the spiral, its angle and radius linear in zeta. */
 void loft_spiral(const loft_slab *slab, size_t v, double zeta, double q[2]);
 
-/* F(y) = sum_i gap_i / (mean gap) sum_v 1 / rho_v mean_r |p_v(r / S) - q_v(r / S)|^2 + tension: for each coordinate
- * y'H y / 2 - right'y + constant, the same H. rho_v is the mean length of the leg at both contours, no less than a
- * small part of the polygon: legs have the length of their knot interval, so that this weighs x' evenly. */
+/* F(y), see objective.c, has no unit: for each coordinate y'H y / 2 - right'y + constant, the same H. Legs count by 1
+ * over their mean length at both contours (no less than a small part of the polygon): legs have the length of their
+ * knot interval, so that this weighs x' evenly. The objective looks at net and its slabs as long as it lives. */
 typedef struct loft_objective loft_objective;
 batten_status loft_objective_new(batten_context *ctx, const loft_stack *stack, const loft_net *net,
                                  const batten_loft_options *opt, loft_objective **out);
