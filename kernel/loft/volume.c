@@ -1,10 +1,13 @@
-/* Area and volume of a loft: the rule of Gauss and Legendre on each span of t, and on halves of each patch by z. With
- * both, degrees up to 15 are exact, and of higher ones less is left than rounding leaves. */
+/* Area and volume of a loft: the rule of Gauss and Legendre on each span of t of each patch, in more and more parts
+ * of both parameters until the area stays. With two parts the volume is exact to degree 15, and of higher ones less
+ * is left than rounding leaves. */
 #include "base/checked.h"
 #include "basis/gauss8.h"
 #include "loft_inner.h"
 
-enum { HALVES = 2 };
+enum { PARTS_MAX = 8 };
+/* Twice as many parts have at least half as many digits more, unless there is a cusp. */
+static const double SAME_AREA = 1e-7;
 
 typedef struct sums {
   double area, volume;
@@ -23,13 +26,13 @@ static void bernstein(unsigned n, double zeta, double *value, double *slope) {
 }
 
 /* One line of nodes t = const of a span: its control points by z, and those of the derivative by t. */
-static void add_line(unsigned n, double gap, const double (*point)[2], const double (*along)[2], double weight,
-                     sums *out) {
-  for (unsigned half = 0; half < HALVES; half++)
+static void add_line(unsigned n, double gap, unsigned parts, const double (*point)[2], const double (*along)[2],
+                     double weight, sums *out) {
+  for (unsigned part = 0; part < parts; part++)
     for (unsigned q = 0; q < GAUSS8; q++) {
       double node, share, value[BSPLINE_ORDER], slope[BSPLINE_ORDER], x[2] = {0}, t[2] = {0}, z[2] = {0};
       gauss8_node(q, &node, &share);
-      bernstein(n, (half + node) / HALVES, value, slope);
+      bernstein(n, (part + node) / parts, value, slope);
       for (unsigned k = 0; k <= n; k++)
         for (int c = 0; c < 2; c++) {
           x[c] += value[k] * point[k][c];
@@ -37,23 +40,22 @@ static void add_line(unsigned n, double gap, const double (*point)[2], const dou
           z[c] += slope[k] * point[k][c] / gap;
         }
       double area = sqrt(t[0] * t[0] + t[1] * t[1] + loft_cross(t, z) * loft_cross(t, z));
-      out->area += weight * share / HALVES * gap * area;
-      out->volume += weight * share / HALVES * gap * 0.5 * loft_cross(x, t);
+      out->area += weight * share / parts * gap * area;
+      out->volume += weight * share / parts * gap * 0.5 * loft_cross(x, t);
     }
 }
 
-/* Points relative to origin, so that the volume of what lies far away keeps its digits. */
-static void add_patch(const batten_loft *loft, size_t i, const double origin[2], sums *out) {
-  const loft_patch *patch = &loft->patches[i];
-  unsigned d = loft->degree[0], n = loft->degree[1];
-  bspline b = {d, patch->count, patch->knots};
-  double gap = loft->heights[i + 1] - loft->heights[i];
-  for (size_t mu = bspline_first(&b); mu < b.count; mu = bspline_next(&b, mu))
+/* A span of a patch. Points relative to origin, so that the volume of what lies far away keeps its digits. */
+static sums measure_span(const loft_patch *patch, const bspline *b, unsigned n, double gap, size_t mu, unsigned parts,
+                         const double origin[2]) {
+  unsigned d = b->degree;
+  double width = b->knots[mu + 1] - b->knots[mu];
+  sums s = {0};
+  for (unsigned part = 0; part < parts; part++)
     for (unsigned q = 0; q < GAUSS8; q++) {
-      double node, share, table[2 * BSPLINE_ORDER], width = b.knots[mu + 1] - b.knots[mu];
-      double point[BSPLINE_ORDER][2] = {{0}}, along[BSPLINE_ORDER][2] = {{0}};
+      double node, share, table[2 * BSPLINE_ORDER], point[BSPLINE_ORDER][2] = {{0}}, along[BSPLINE_ORDER][2] = {{0}};
       gauss8_node(q, &node, &share);
-      bspline_basis(&b, mu, b.knots[mu] + node * width, 1, table);
+      bspline_basis(b, mu, b->knots[mu] + (part + node) / parts * width, 1, table);
       for (unsigned j = 0; j <= d; j++)
         for (unsigned k = 0; k <= n; k++)
           for (int c = 0; c < 2; c++) {
@@ -61,8 +63,29 @@ static void add_patch(const batten_loft *loft, size_t i, const double origin[2],
             point[k][c] += table[j] * at;
             along[k][c] += table[d + 1 + j] * at;
           }
-      add_line(n, gap, (const double(*)[2])point, (const double(*)[2])along, share * width, out);
+      add_line(n, gap, parts, (const double(*)[2])point, (const double(*)[2])along, share / parts * width, &s);
     }
+  return s;
+}
+
+static void add_patch(const batten_loft *loft, size_t i, const double origin[2], sums *out) {
+  const loft_patch *patch = &loft->patches[i];
+  unsigned n = loft->degree[1];
+  bspline b = {loft->degree[0], patch->count, patch->knots};
+  double gap = loft->heights[i + 1] - loft->heights[i];
+  /* The volume is a polynomial of degree 2 n by z and 2 d - 1 by t; the rule is exact to 2 GAUSS8 - 1. */
+  unsigned least = 2 * n >= 2 * GAUSS8 || 2 * b.degree > 2 * GAUSS8 ? 2 : 1;
+  for (size_t mu = bspline_first(&b); mu < b.count; mu = bspline_next(&b, mu)) {
+    unsigned parts = least;
+    sums s = measure_span(patch, &b, n, gap, mu, parts, origin), last;
+    do {
+      last = s;
+      parts *= 2;
+      s = measure_span(patch, &b, n, gap, mu, parts, origin);
+    } while (parts < PARTS_MAX && fabs(s.area - last.area) > SAME_AREA * s.area);
+    out->area += s.area;
+    out->volume += s.volume;
+  }
 }
 
 batten_status batten_loft_measure(batten_context *ctx, const batten_loft *loft, batten_loft_measures *out) {

@@ -3,7 +3,7 @@
  * contours that are drawn by lot, so that continuity is exact but for rounding. */
 #include "tap.h"
 
-#include "basis/refine.h"
+#include "basis/gauss8.h"
 #include "loft/loft_inner.h"
 
 enum { CONTOURS = 5, POINTS = 200 };
@@ -175,6 +175,20 @@ static void by_hand(batten_context *ctx) {
   T_CHECK(a.knot_count[1] == 8 && a.control_points[5] == 1 && a.control_points[8] == 2 && a.control_points[11] == 3 &&
               memcmp(a.control_points, b.control_points, sizeof(double[36])) == 0,
           "z rises evenly; the only patch is the whole");
+  batten_loft_measures m;
+  batten_surface_measures area;
+  T_OK(batten_loft_measure(ctx, loft, &m), ctx);
+  T_OK(batten_surface_measure(ctx, patch, &area), ctx);
+  T_RATIO(fabs(m.area - area.area) / area.area, 1e-9, "area %g", m.area);
+  T_CHECK(isnan(m.volume), "open: no volume");
+  T_STATUS(batten_loft_measure(ctx, loft, NULL), BATTEN_E_INVALID, ctx, "out: NULL");
+  for (size_t k = 0; k < 12; k++) control[2 * k + 1] = 0;
+  batten_loft *wall = NULL;
+  T_OK(loft_make(ctx, &stack, &net, heights, control, &wall), ctx);
+  /* With y = 0 a plane wall: x runs from 0 to 1 below and to 2 above without turning, over a height of 3. */
+  T_OK(batten_loft_measure(ctx, wall, &m), ctx);
+  T_RATIO(fabs(m.area - 4.5), 1e-13, "area of a trapezoid");
+  batten_loft_free(wall);
   batten_surface_free(whole);
   batten_surface_free(patch);
 
@@ -267,6 +281,10 @@ static void measure(batten_context *ctx, scene *s, const batten_loft *loft) {
   T_OK(loft_measure(ctx, loft, curves, &interpolation, &continuity), ctx);
   T_RATIO(interpolation, 4e-14, "measured interpolation");
   T_RATIO(continuity, 4e-12, "measured continuity");
+  batten_context *single = t_context(NULL, NULL, 1);
+  T_OK(loft_measure(single, loft, curves, &moved[0], &moved[1]), single);
+  T_CHECK(moved[0] == interpolation && moved[1] == continuity, "the same with one thread");
+  batten_context_free(single);
 
   /* A whole column of a patch shifted by a vector of length 5: its l-th derivative at the lower contour jumps by n! /
    * (n - l)! times that, whatever t, and at the upper one none does. */
@@ -300,6 +318,41 @@ static void measure(batten_context *ctx, scene *s, const batten_loft *loft) {
   batten_loft_free(other);
 }
 
+/* The area of sections by the curves' own measure, over all z by the rule of Gauss and Legendre on halves of patches.
+ */
+static double stacked_volume(batten_context *ctx, const batten_loft *loft) {
+  batten_loft_form form = batten_loft_get(loft);
+  double volume = 0;
+  for (size_t h = 0; h < 4 * (form.contours - 1); h++)
+    for (unsigned q = 0; q < GAUSS8; q++) {
+      const double *z = form.heights + h / 4;
+      double node, weight, part = (z[1] - z[0]) / 4;
+      gauss8_node(q, &node, &weight);
+      batten_curve *section = NULL;
+      batten_curve_measures m;
+      if (batten_loft_section(ctx, loft, z[0] + ((double)(h % 4) + node) * part, &section) < 0 ||
+          batten_curve_measure(ctx, section, &m) < 0)
+        T_CHECK(false, "%s", batten_error(ctx));
+      volume += weight * part * m.area;
+      batten_curve_free(section);
+    }
+  return volume;
+}
+
+static batten_status call_measure(batten_context *ctx, void *arg) {
+  batten_loft_measures m;
+  return batten_loft_measure(ctx, arg, &m);
+}
+
+static void volumes(batten_context *ctx, const batten_loft *loft) {
+  batten_loft_measures m;
+  T_OK(batten_loft_measure(ctx, loft, &m), ctx);
+  double volume = stacked_volume(ctx, loft);
+  T_RATIO(fabs(m.volume - volume) / fabs(volume), 1e-11, "volume %g, and of its sections", m.volume);
+  if (batten_loft_get(loft).degree[0] == 2)
+    t_cancel_every_progress("batten_loft_measure", call_measure, (void *)(uintptr_t)loft);
+}
+
 static void agree(batten_context *ctx, uint64_t seed, unsigned d, unsigned l, unsigned n, bool closed,
                   size_t contours) {
   scene s;
@@ -309,6 +362,7 @@ static void agree(batten_context *ctx, uint64_t seed, unsigned d, unsigned l, un
   T_OK(loft_make(ctx, &s.stack, &s.net, s.heights, s.control, &loft), ctx);
   compare_forms(ctx, &s, loft);
   compare_contours(ctx, &s, loft);
+  if (closed) volumes(ctx, loft);
   measure(ctx, &s, loft);
   batten_loft_free(loft);
   scene_free(ctx, &s);

@@ -209,6 +209,13 @@ static void insertions(batten_context *ctx, uint64_t *seed, unsigned degree, boo
           "rows are convex combinations, columns ascend");
   T_RATIO(sum_off, 1e-15, "their sums are 1");
 
+  if (!closed) {
+    bspline_refine(&b.b, 2, x, &both.b, z);
+    double off = 0;
+    for (size_t k = 0; k < 2 * both.count; k++) off = fmax(off, fabs(y[k] - z[k]));
+    T_RATIO(off, 1e-15, "as bspline_refine has it");
+  }
+
   /* By way of the common space, which lies between b and both. */
   T_OK(loft_insertion(ctx, &b, &common, &m), ctx);
   T_OK(loft_insertion(ctx, &common, &both, &next), ctx);
