@@ -1,6 +1,6 @@
 /* Area and volume of a loft: the rule of Gauss and Legendre on each span of t of each patch, in more and more parts
- * of both parameters until the area stays. With two parts the volume is exact to degree 15, and of higher ones less
- * is left than rounding leaves. */
+ * of both parameters until the area stays. The volume is exact but for the highest degrees, of which four parts leave
+ * next to nothing. */
 #include "base/checked.h"
 #include "basis/gauss8.h"
 #include "loft_inner.h"
