@@ -84,87 +84,88 @@ static batten_status check_plane(batten_context *ctx, const batten_surface *s, c
 
 /* ---- one span pair -------------------------------------------------------------------------------- */
 
-static void copy_sheet(const sections_sheet *from, sections_sheet *to) {
-  double *c = to->c;
-  memcpy(c, from->c, sections_count(from) * sizeof *c);
-  *to = *from;
-  to->c = c;
-}
-
-static void copy_column(const sections_sheet *from, bool last, sections_sheet *to) {
+/* Column 0 or the last (1), or all of them (-1). */
+static void copy_columns(const sections_sheet *from, int column, sections_sheet *to) {
   double *c = to->c;
   size_t columns = from->degree[1] + 1, rows = sections_count(from) / columns;
   *to = *from;
-  to->degree[1] = 0;
   to->c = c;
-  for (size_t k = 0; k < rows; k++) c[k] = from->c[k * columns + (last ? columns - 1 : 0)];
+  if (column < 0) {
+    memcpy(c, from->c, rows * columns * sizeof *c);
+    return;
+  }
+  to->degree[1] = 0;
+  for (size_t k = 0; k < rows; k++) c[k] = from->c[k * columns + (column ? columns - 1 : 0)];
 }
 
 static void negate(sections_sheet *p) {
   for (size_t k = 0; k < sections_count(p); k++) p->c[k] = -p->c[k];
 }
 
-/* Both verdicts together. */
-static signed char worse(signed char a, signed char b) {
-  if (a == SECTIONS_VIOLATED || b == SECTIONS_VIOLATED) return SECTIONS_VIOLATED;
-  return a < b ? a : b;
+/* Cuts box 0 of the stack in two by s and keeps one half. */
+static void take_half(sections_search *search, bool upper) {
+  sections_box *b = sections_box_at(search, 0), *other = sections_box_at(search, 1), keep;
+  sections_halve(0, &b->a, &other->a, search->room);
+  sections_halve(0, &b->w, &other->w, search->room);
+  if (!upper) return;
+  keep = *b;
+  *b = *other;
+  *other = keep;
 }
 
-static void swap_boxes(sections_box *a, sections_box *b) {
-  sections_box keep = *a;
-  *a = *b;
-  *b = keep;
+/* A part of the domain: a, w over at[0][0] .. at[0][1], at[1][0] .. at[1][1], with the sign that is wanted. */
+typedef struct source {
+  const sections_sheet *a, *w;
+  int column; /* -1: all, else one alone */
+  int sign;
+} source;
+
+static void put_source(const source *from, sections_search *search) {
+  sections_box *b = sections_box_at(search, 0);
+  copy_columns(from->a, from->column, &b->a);
+  copy_columns(from->w, from->column, &b->w);
+  if (from->sign < 0) negate(&b->w);
 }
 
-/* Of a, w in stack[0]: a flat end to s = 0, flat ends at both sides apart. at: corners of the domain's part. */
-static void prove_ends(const sections_search *search, const sections_pair *p, const double at[2][2], bool margin,
-                       sections_record *record) {
-  sections_box *whole = &search->stack[0], *keep = &search->stack[2 * search->depth_max + 2];
-  sections_stretch t = {
-      .from = {at[0][0], at[1][0]}, .to = {at[0][1], at[1][1]}, .factor = p->factor, .margin = margin};
+/* A flat end is put to s = 0; flat ends at both sides are proven apart. */
+static void prove_ends(sections_search *search, const sections_pair *p, const source *from, const double at[2][2],
+                       bool margin, sections_record *record) {
   bool both = p->flat[0] && p->flat[1];
-  if (both) {
-    sections_halve(0, &whole->a, &keep->a, search->room);
-    sections_halve(0, &whole->w, &keep->w, search->room);
-    t.to[0] = 0.5 * at[0][0] + 0.5 * at[0][1];
-  }
-  if (p->flat[0] || !p->flat[1]) {
-    t.flat = p->flat[0];
-    t.allowed = p->allowed[0];
+  signed char verdict = SECTIONS_PROVEN;
+  for (int side = 0; side < 2 && verdict >= SECTIONS_OPEN; side++) {
+    if (!both && side != p->flat[1]) continue;
+    sections_stretch t = {.from = {at[0][side], at[1][0]},
+                          .to = {both ? 0.5 * at[0][0] + 0.5 * at[0][1] : at[0][1 - side], at[1][1]},
+                          .factor = p->factor,
+                          .flat = p->flat[side],
+                          .allowed = p->allowed[side],
+                          .margin = margin};
+    put_source(from, search);
+    if (both) take_half(search, side == 1);
+    if (side == 1) sections_reverse(&search->stack[0].a);
+    if (side == 1) sections_reverse(&search->stack[0].w);
     sections_prove(search, &t, record);
-    if (!both || record->verdict < 0) return;
-    swap_boxes(whole, keep);
+    verdict = record->verdict < verdict ? record->verdict : verdict;
   }
-  signed char before = both ? record->verdict : SECTIONS_PROVEN;
-  sections_reverse(&whole->a);
-  sections_reverse(&whole->w);
-  t.from[0] = at[0][1];
-  t.to[0] = both ? t.to[0] : at[0][0];
-  t.flat = true;
-  t.allowed = p->allowed[1];
-  sections_prove(search, &t, record);
-  record->verdict = worse(before, record->verdict);
+  record->verdict = verdict;
 }
 
 /* Whether the section at the least or largest v has the sign. */
-static bool section_has(const lane *l, const double at[2][2], size_t box_limit, bool last, int sign) {
-  sections_search search = l->search;
-  search.box_limit = box_limit;
-  copy_column(&l->pair.a, last, &search.stack[0].a);
-  copy_column(&l->pair.w, last, &search.stack[0].w);
-  if (sign < 0) negate(&search.stack[0].w);
+static bool section_has(lane *l, const double at[2][2], size_t box_limit, int column, int sign) {
+  source from = {.a = &l->pair.a, .w = &l->pair.w, .column = column, .sign = sign};
   sections_record r = {.least = INFINITY, .target = INFINITY, .bound = INFINITY};
-  prove_ends(&search, &l->pair, at, false, &r);
+  l->search.box_limit = box_limit;
+  prove_ends(&l->search, &l->pair, &from, at, false, &r);
   return r.verdict == SECTIONS_PROVEN;
 }
 
 /* The sign of both end sections, or 0. */
-static signed char find_sign(const lane *l, const double at[2][2], size_t box_limit) {
+static signed char find_sign(lane *l, const double at[2][2], size_t box_limit) {
   const sections_sheet *w = &l->pair.w;
   double sum = 0;
   for (size_t k = 0; k <= w->degree[0]; k++) sum += w->c[k * (w->degree[1] + 1)];
   signed char sign = sum < 0 ? -1 : 1;
-  return section_has(l, at, box_limit, false, sign) && section_has(l, at, box_limit, true, sign) ? sign : 0;
+  return section_has(l, at, box_limit, 0, sign) && section_has(l, at, box_limit, 1, sign) ? sign : 0;
 }
 
 /* The place of span pair k, its polynomials. */
@@ -184,10 +185,8 @@ static void prove_pair(lane *l, const double at[2][2], double target, size_t box
   r->target = target;
   r->bound = INFINITY;
   l->search.box_limit = box_limit;
-  copy_sheet(&l->pair.a, &l->search.stack[0].a);
-  copy_sheet(&l->pair.w, &l->search.stack[0].w);
-  if (r->sign < 0) negate(&l->search.stack[0].w);
-  prove_ends(&l->search, &l->pair, at, r->strict, r);
+  source from = {.a = &l->pair.a, .w = &l->pair.w, .column = -1, .sign = r->sign};
+  prove_ends(&l->search, &l->pair, &from, at, r->strict, r);
 }
 
 static void look_at_some(void *arg, size_t index) {
@@ -288,18 +287,14 @@ static batten_sections report(const job *j, signed char *verdicts) {
 /* ---- room ----------------------------------------------------------------------------------------- */
 
 static batten_status make_lane(batten_context *ctx, const sections_plan *plan, unsigned depth_max, lane *l) {
-  size_t boxes = 2 * (size_t)depth_max + 3, a = sections_a_count(plan), w = sections_w_count(plan);
+  size_t boxes = 2 * (size_t)depth_max + 2, a = sections_a_count(plan), w = sections_w_count(plan);
   l->block = batten_alloc_array(ctx, (boxes + 1) * (a + w) + sections_room(plan), sizeof *l->block);
   l->search.stack = batten_alloc_array(ctx, boxes, sizeof *l->search.stack);
   if (!l->block || !l->search.stack) return BATTEN_E_NOMEM;
-  double *at = l->block;
-  for (size_t k = 0; k < boxes; k++, at += a + w) {
-    l->search.stack[k].a.c = at;
-    l->search.stack[k].w.c = at + a;
-  }
-  l->pair.a.c = at;
-  l->pair.w.c = at + a;
-  l->search.room = at + a + w;
+  l->pair.a.c = l->block;
+  l->pair.w.c = l->pair.a.c + a;
+  l->search.room = l->pair.w.c + w;
+  l->search.coefficients = l->search.room + sections_room(plan);
   l->search.plan = plan;
   l->search.depth_max = depth_max;
   return BATTEN_OK;

@@ -105,16 +105,21 @@ typedef struct sections_stretch {
   bool margin;    /* a bound is wanted besides the sign */
 } sections_stretch;
 
+/* What a task works with. Boxes of the stack get their room when they are needed first: most never are. */
 typedef struct sections_search {
   const sections_plan *plan;
   unsigned depth_max;
-  size_t box_limit;    /* 0: nothing is cut */
-  sections_box *stack; /* [2 depth_max + 3]: their a.c and w.c have room */
-  double *room;        /* [sections_room] */
+  size_t box_limit;     /* 0: nothing is cut */
+  sections_box *stack;  /* [2 depth_max + 2] */
+  size_t made;          /* of them have room */
+  double *coefficients; /* [2 depth_max + 2][those of a and of w] */
+  double *room;         /* [sections_room] */
 } sections_search;
 
+/* Box k <= made of the stack, with room. */
+sections_box *sections_box_at(sections_search *search, size_t k);
 /* Proves that stack[0] is positive (its a, w are given), or sets record->verdict otherwise; OPEN: it was not cut. */
-void sections_prove(const sections_search *search, const sections_stretch *stretch, sections_record *record);
+void sections_prove(sections_search *search, const sections_stretch *stretch, sections_record *record);
 /* The halves of a sheet in direction axis; work [sections_count(lower)]. */
 void sections_halve(unsigned axis, sections_sheet *lower, sections_sheet *upper, double *work);
 /* By 1 - s. */

@@ -296,6 +296,16 @@ static bool can_cut(const sections_search *search, const sections_record *record
   return b->depth[b->axis] < search->depth_max;
 }
 
+sections_box *sections_box_at(sections_search *search, size_t k) {
+  sections_box *b = &search->stack[k];
+  if (k < search->made) return b;
+  size_t a = sections_a_count(search->plan), w = sections_w_count(search->plan);
+  b->a.c = search->coefficients + k * (a + w);
+  b->w.c = b->a.c + a;
+  search->made = k + 1;
+  return b;
+}
+
 /* Cuts the box into itself and `other`. */
 static void cut(const sections_search *search, sections_box *b, sections_box *other) {
   unsigned axis = b->axis;
@@ -319,7 +329,7 @@ static int settle(const sections_box *b, sections_record *record) {
 }
 
 /* Depth first, the worse half first: a wrong sign is found soon. */
-void sections_prove(const sections_search *search, const sections_stretch *t, sections_record *record) {
+void sections_prove(sections_search *search, const sections_stretch *t, sections_record *record) {
   sections_box *stack = search->stack;
   stack[0].lower[0] = stack[0].lower[1] = 0;
   stack[0].width[0] = stack[0].width[1] = 1;
@@ -338,7 +348,7 @@ void sections_prove(const sections_search *search, const sections_stretch *t, se
       count--;
       continue;
     }
-    cut(search, b, b + 1);
+    cut(search, b, sections_box_at(search, count));
     int found[2] = {judge(search, t, b, record), judge(search, t, b + 1, record)};
     verdict = found[0] < found[1] ? found[0] : found[1];
     if (found[0] == SECTIONS_VIOLATED || found[1] == SECTIONS_VIOLATED) verdict = SECTIONS_VIOLATED;
