@@ -4,6 +4,8 @@
 
 #include <float.h>
 
+#include "surface/certify_sections.h"
+
 enum { ORDER = BATTEN_SURFACE_DEGREE_MAX + 1, POWERS = 6 };
 
 /* ---- evaluation that knows nothing of the kernel ------------------------------------------------- */
@@ -310,6 +312,62 @@ static void test_random(batten_context *ctx) {
   T_CHECK(low < 5, "%zu surfaces whose margin is far below the grid's", low);
 }
 
+/* Polynomials and their bounds, on parts of parts: curvature at corners against samples. */
+static void test_coefficients(batten_context *ctx) {
+  uint64_t seed = 21;
+  double worst = 0, largest = 0;
+  for (int k = 0; k < 200; k++) {
+    surface_case s = scene_of(&seed, 0.1);
+    if (k % 4 == 0) turn(&s, (double[]){1, 0, 0}, (double[]){0, 1, 0}, up, 1e4);
+    batten_surface *surface = surface_case_make(ctx, &s);
+    sections_plan plan;
+    sections_plan_make(surface, up, &plan);
+    double *room = malloc((sections_room(&plan) + 2 * (sections_a_count(&plan) + sections_w_count(&plan))) * 8);
+    sections_pair p = {.a.c = room + sections_room(&plan)};
+    p.w.c = p.a.c + sections_a_count(&plan);
+    sections_sheet a = {.c = p.w.c + sections_w_count(&plan)}, w = {.c = a.c + sections_a_count(&plan)};
+    size_t mu[SURFACE_KNOTS], nu[SURFACE_KNOTS], rows = spans_of(&s, 0, mu), columns = spans_of(&s, 1, nu);
+    size_t span[2] = {mu[t_random(&seed) % rows], nu[t_random(&seed) % columns]};
+    sections_pair_make(&plan, span[0], span[1], room, &p);
+    long double lower[2] = {0, 0}, width[2] = {1, 1};
+    for (int cut = 0; cut < 16; cut++) {
+      for (int c = 0; c < 4; c++) {
+        long double place[2];
+        for (int i = 0; i < 2; i++) {
+          const double *t = s.knots[i] + span[i];
+          long double part = lower[i] + (c >> i & 1 ? width[i] : 0);
+          place[i] = (1 - part) * t[0] + part * t[1];
+        }
+        size_t i = c & 1 ? p.w.degree[0] : 0, q = s.degree[1], at = c & 1 ? s.degree[0] - 1 : 0;
+        const double *x = p.a.c + at * (q + 1) + (c & 2 ? q : 0), *y = x + s.degree[0] * (q + 1);
+        double speed = hypot(*x, *y), value = p.w.c[i * (2 * q + 1) + (c & 2 ? 2 * q : 0)];
+        double found = ldexp(value / pow(speed, 3) * p.factor, surface->exponent);
+        double expected = (double)curvature_at(&s, up, span[0], span[1], place[0], place[1], NULL);
+        double error = fabs(value) * 6 * p.a.error[at] / speed + p.w.error[i] + 1e-18 * fabs(value);
+        double ratio = fabs(found - expected) / (error / fabs(value) * fabs(expected));
+        if (speed > 1e-3 && fabs(value) > 1e-6) worst = fmax(worst, ratio);
+        if (speed > 1e-3 && fabs(value) > 1e-6) largest = fmax(largest, error / fabs(value));
+      }
+      unsigned axis = t_random(&seed) % 2, upper = t_random(&seed) % 2;
+      sections_halve(axis, &p.a, &a, room);
+      sections_halve(axis, &p.w, &w, room);
+      width[axis] /= 2;
+      if (upper == 0) continue;
+      lower[axis] += width[axis];
+      memcpy(p.a.c, a.c, sections_count(&a) * sizeof *a.c);
+      memcpy(p.w.c, w.c, sections_count(&w) * sizeof *w.c);
+      for (int part = 0; part < 2; part++) {
+        sections_sheet *to = part ? &p.a : &p.w, *from = part ? &a : &w;
+        memcpy(to->error, from->error, sizeof to->error);
+        memcpy(to->most, from->most, sizeof to->most);
+      }
+    }
+    free(room);
+    batten_surface_free(surface);
+  }
+  T_RATIO(worst, 1, "curvature at corners of parts, off by less than the bounds (which are below %.2g)", largest);
+}
+
 /* ---- the same surface otherwise -------------------------------------------------------------------- */
 
 static bool same_pairs(const verdict *a, const verdict *b, size_t count) {
@@ -459,6 +517,7 @@ int main(void) {
   test_flat(ctx);
   test_wanted(ctx);
   test_random(ctx);
+  test_coefficients(ctx);
   test_invariances(ctx);
   test_threads(ctx);
   test_limits(ctx);
