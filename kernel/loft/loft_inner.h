@@ -12,7 +12,8 @@
  * net.c          control points of all patches as functions of free unknowns: continuity [eq. 9] and flat points
  * spiral.c       legs that turn and stretch evenly: the points q of eq. 12
  * objective.c    eq. 12 and 13 as a sparse system; their minimum
- * rows.c         separators, and the inequalities of eq. 10 and 11
+ * turns.c        what turns must keep [eq. 10, 11], and whether those of a surface do
+ * rows.c         separators, and the inequalities that they give
  * program.c      the quadratic program, rigid or elastic
  * rounds.c       separators and programs in turns, finer inequalities
  * measure.c      what the surface leaves of interpolation and continuity, from the patches alone
@@ -28,6 +29,7 @@
 
 #include <batten/loft.h>
 #include <batten/matrix.h>
+#include <batten/qp.h>
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
@@ -215,16 +217,86 @@ void loft_objective_solve(const loft_objective *o, double *x);
 batten_matrix loft_objective_hessian(const loft_objective *o);
 double loft_objective_value(const loft_objective *o, const double *y);
 
-/* ---- inequalities and programs (rows.c, program.c, rounds.c) ------------------------------------- */
+/* ---- inequalities and programs (turns.c, rows.c, program.c, rounds.c) ---------------------------- */
 
-/* Inequalities row . y >= lower over the 2 unknowns of net (unknown p of coordinate k is column 2 p + k), each of
- * length 1, with the offsets taken off. */
+/* What is asked of the turn at a vertex in all sections, radians: lower <= turn <= upper. */
+typedef struct loft_bound {
+  double lower, upper;
+} loft_bound;
+/* That turns keep their sign and the part `margin` of what both contours turn by at least, and stay below eq. 11, or
+ * what the contours turn by if that is more. False: nothing is asked. */
+bool loft_bound_of(const loft_slab *slab, size_t v, double margin, loft_bound *out);
+/* Leg v of patch i, modulo the legs: its control points by zeta [degree + 1][2]. */
+void loft_leg(const loft_net *net, const double *control, size_t i, size_t v, double (*out)[2]);
+/* By how much the turn at a vertex of a surface misses its bound, at most; 0: it is proven to hold for all zeta. */
+double loft_shortage(const loft_net *net, const double *control, size_t i, size_t v, const loft_bound *bound);
+
+/* A separator: a direction by zeta that leg v stays on the one side of and leg v + 1 on the other, each by lower / 2
+ * to upper / 2; on a part of the patch's height. */
+enum { LOFT_FIELD = 4 }; /* its degree */
+typedef struct loft_piece {
+  size_t slab, vertex, group;
+  double from, to;
+  double w[LOFT_FIELD + 1][2]; /* Bernstein */
+  loft_bound bound;
+  double inside; /* by which inequalities are raised: what solvers leave shall be inside */
+  uint64_t used; /* inequalities that are in the program */
+} loft_piece;
+
+typedef struct loft_pieces {
+  size_t count, room;
+  loft_piece *all; /* those of a vertex one after the other */
+} loft_pieces;
+void loft_pieces_free(batten_context *ctx, loft_pieces *p);
+
+/* Directions of the legs of a patch, of which separators are made, at dyadic heights. Where the turns of the surface
+ * do not hold they are moved, legs as evenly as may be, until they do. */
+typedef struct loft_directions {
+  size_t slab;
+  unsigned depth;  /* pieces may be 1 / 2^depth long */
+  double *turned;  /* [LOFT_FIELD 2^depth + 1][legs] against those that turn evenly from contour to contour */
+  bool whole;      /* all turns hold by themselves */
+} loft_directions;
+batten_status loft_directions_make(batten_context *ctx, const loft_net *net, const double *control, size_t i,
+                                   double margin, unsigned depth, loft_directions *out);
+void loft_directions_free(batten_context *ctx, loft_directions *d);
+
+/* Appends the pieces of vertex v: at least 2^least of them, and so many more (2^depth) that `control` satisfies their
+ * inequalities; *strict: it does. Fails: NOMEM. */
+batten_status loft_pieces_add(batten_context *ctx, const loft_net *net, const double *control,
+                              const loft_directions *d, size_t v, double margin, unsigned least, size_t group,
+                              loft_pieces *out, bool *strict);
+
+/* Inequalities row . y >= lower over the 2 unknowns of net (unknown p of coordinate k is column 2 p + k), in radians
+ * about, with the offsets taken off. */
 typedef struct loft_rows {
-  loft_matrix matrix;
-  double *lower;
-  uint32_t *slab, *vertex; /* [rows] whose they are */
-  size_t all;              /* inequalities that there are */
+  size_t columns, rows, row_room, entries, entry_room;
+  size_t *starts;
+  uint32_t *indices;
+  double *values, *lower;
+  size_t *group; /* [rows] vertices whose inequalities give way together */
 } loft_rows;
+void loft_rows_free(batten_context *ctx, loft_rows *r);
+/* Inequalities that a vertex has for each piece. */
+size_t loft_rows_each(const loft_net *net);
+/* Adds the inequalities of piece that `control` satisfies by less than `near` - gives, and that are not used yet; what
+ * only says something of the contours is left out. *least: smallest value less its lower side, of all. */
+batten_status loft_rows_add(batten_context *ctx, const loft_net *net, const double *control, loft_piece *piece,
+                            double near, loft_rows *rows, double *least);
+
+/* The minimum of the objective under rows, where the groups [groups] of them give way, by `give` radians, rather than
+ * cost more than `weight` for each. Unknowns are those near to the rows, `reach` steps in the Hessian. Not the minimum
+ * but another point: BATTEN_W_ACCURACY. Fails: NOMEM, TOO_LARGE, CANCELLED. */
+typedef struct loft_program {
+  batten_qp_workspace *workspace;
+  batten_matrix hessian;
+  const double *free; /* [unknowns][2] the minimum without rows */
+  double weight;
+  unsigned reach;
+  size_t iterations;
+} loft_program;
+batten_status loft_program_solve(batten_context *ctx, loft_program *p, const loft_rows *rows, size_t groups, double *y,
+                                 double *give);
 
 /* Where there is no solution: by how much the turn at a vertex fails. */
 typedef struct loft_elastic {
