@@ -14,7 +14,10 @@ static batten_status take_row(const bx_table *t, bx_soup *soup) {
 }
 
 batten_status bx_read_text(bx_reader *r, bx_soup *soup, unsigned n) {
-  bx_table t = {.r = r, .n = n, .wanted = (1u << (BX_W + 1)) - 1, .names = "x y z nx ny nz u v w"};
+  bx_table t = {.r = r,
+                .n = n,
+                .wanted = ((1u << (BX_W + 1)) - 1) | 1u << BX_STATION | 1u << BX_HALF_BREADTH | 1u << BX_WATERLINE,
+                .names = "x y z nx ny nz u v w"};
   bool end;
   bx_line line;
   batten_status st = bx_next_line(r, &end);

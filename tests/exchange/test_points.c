@@ -369,6 +369,16 @@ static void test_shared(batten_context *ctx) {
   }
 }
 
+/* All rows of a table of offsets, at station, half-breadth and waterline. */
+static void test_offsets(batten_context *ctx) {
+  static const char text[] = "z_m,x_m,half_breadth_m\n1,5,0\n2,5,0\n3,5,4\n";
+  batten_cloud c = {0};
+  T_OK(points_of(ctx, "a.csv", text, strlen(text), 0, &c), ctx);
+  T_CHECK(c.n == 3 && c.count == 3 && c.points[0] == 5 && c.points[1] == 0 && c.points[2] == 1 && c.points[7] == 4,
+          "%zu points of a table of offsets", c.count);
+  batten_cloud_free(ctx, &c);
+}
+
 int main(void) {
   batten_context *ctx = t_context(NULL, NULL, 1);
   test_samples(ctx);
@@ -377,6 +387,7 @@ int main(void) {
   test_dimension(ctx);
   test_gzip(ctx);
   test_long_lines(ctx);
+  test_offsets(ctx);
   test_files(ctx);
   test_shared(ctx);
   T_CHECK(batten_bytes_in_use(ctx) == 0, "all is released");

@@ -35,7 +35,8 @@ BATTEN_API batten_read_points_options batten_read_points_options_default(void);
  *   .xyz .txt .csv .tsv .asc .dat   text: separated by semicolons, else commas, else blanks; # % // comments. Without
  *             names 2 columns are x y, 3 x y z, 4 x y nx ny, 6 x y z nx ny nz; others need a line of names above the
  *             numbers (also as a comment), from which x, y, z, nx, ny, nz, the parameters u, v and the weight w (or
- *             "weight") are taken in any order. Lines "contour N" are passed over.
+ *             "weight") are taken in any order. Of tables of offsets (see batten_read_contours) all rows are points
+             (station, half-breadth, waterline). Lines "contour N" are passed over.
  *   .ply      ASCII and both binary orders; nx ny nz are the normals, u v the parameters, w or weight the weights; the
  *             vertices are planar without z
  *   .obj      v and vn: normals where every vertex has one      .off  also NOFF, COFF, STOFF
