@@ -13,7 +13,9 @@
  * kinks at contours, and what lies nearest to them turns as fast as continuity lets it, all at once beside the
  * contours; b rounds this to about b^(1/4) of a patch. The tension of trajectories a is int |d^2/dz^2 d_j|^2 dz times
  * (mean gap)^3 / P^2, so that stacks of other proportions of height to width have the same. w_j: 1 for the first and
- * the last trajectory; those of closed contours all have their part, by knot intervals.
+ * the last trajectory; those of closed contours all have their part, the integral of their B-spline over t. So what
+ * is left of the tension to the mean of x over t, which no leg says anything about and which is the same on any
+ * knots, is that of a spline through the contours' means.
  *
  * The spiral is replaced by the polynomial b_v nearest to it at the r / S: up to a constant the mean of squares is
  * (e - b)' M (e - b), with the control points e of p_v and M = mean_r B_k(r / S) B_l(r / S). So values and gradients
@@ -144,7 +146,7 @@ static double trajectory_weight(const loft_objective *o, size_t i, size_t j) {
   const loft_space *s = &o->net->slabs[i].space;
   double g = relative_gap(o, i), share;
   if (o->closed)
-    share = (loft_greville(s, (ptrdiff_t)j + 1) - loft_greville(s, (ptrdiff_t)j - 1)) / 2;
+    share = (loft_knot(s, (ptrdiff_t)(j + s->degree + 1)) - loft_knot(s, (ptrdiff_t)j)) / (s->degree + 1);
   else
     share = j == 0 || j + 1 == s->count;
   return share * o->tension / (g * g * g * o->polygon * o->polygon);

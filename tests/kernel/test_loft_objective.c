@@ -96,7 +96,8 @@ static double opinion(const fixture *f, double tension, unsigned samples, const 
     for (size_t j = 0; j < s->space.count; j++) {
       double share = j == 0 || j + 1 == s->space.count;
       if (s->space.closed)
-        share = (loft_greville(&s->space, (ptrdiff_t)j + 1) - loft_greville(&s->space, (ptrdiff_t)j - 1)) / 2;
+        share = (loft_knot(&s->space, (ptrdiff_t)(j + s->space.degree + 1)) - loft_knot(&s->space, (ptrdiff_t)j)) /
+                (s->space.degree + 1);
       sum += share * tension * bending(n, control + 2 * loft_at(net, i, j, 0)) / (g * g * g * polygon * polygon);
     }
   }
