@@ -359,8 +359,20 @@ static void set_tones(const drawing *d, side *s, int which, double full) {
   }
 }
 
+/* Most of the result is blue, whichever way its contours run. */
+static void turn_signs(drawing *d, size_t sides) {
+  const side *result = &d->sides[sides - 1];
+  ptrdiff_t balance = 0;
+  for (size_t i = 0; i < result->vertex_count; i++)
+    balance += (result->curvatures[1][i] > 0) - (result->curvatures[1][i] < 0);
+  for (size_t k = 0; balance < 0 && k < sides; k++)
+    for (size_t i = 0; i < d->sides[k].vertex_count; i++)
+      d->sides[k].curvatures[1][i] = -d->sides[k].curvatures[1][i];
+}
+
 static batten_status color(batten_context *ctx, drawing *d, size_t sides) {
   batten_status st = BATTEN_OK;
+  turn_signs(d, sides);
   for (int which = 0; st >= 0 && which < 2; which++) {
     double full = 0;
     st = full_tone(ctx, &d->sides[sides - 1], which, &full);
