@@ -5,40 +5,42 @@
 #include "basis/refine.h"
 #include "loft_inner.h"
 
-/* A spline whose control points are numbers of rows: combination weights [row] of these; [count][row][2]. */
+#include <string.h>
+
+/* Splines on the same knots: control points [space.count][row][2]. */
 typedef struct strip {
   bspline space;
   size_t row;
   const double *points;
 } strip;
 
-static void strip_at(const strip *s, const double *weights, double t, double out[2]) {
+/* Their points at t [row]: of a patch the Bezier points by z. */
+static void column_at(const strip *s, double t, double (*out)[2]) {
   double table[BSPLINE_ORDER];
   unsigned d = s->space.degree;
   size_t mu = bspline_span(&s->space, t);
   bspline_basis(&s->space, mu, t, 0, table);
   const double *from = s->points + 2 * s->row * (mu - d);
-  out[0] = out[1] = 0;
+  memset(out, 0, s->row * sizeof *out);
   for (unsigned j = 0; j <= d; j++)
     for (size_t k = 0; k < s->row; k++, from += 2) {
-      out[0] += table[j] * weights[k] * from[0];
-      out[1] += table[j] * weights[k] * from[1];
+      out[k][0] += table[j] * from[0];
+      out[k][1] += table[j] * from[1];
     }
 }
 
-/* The k-th derivative by the part of the height at the lower or upper end: the k-th difference of the first or last
- * Bezier points, n! / (n - k)! times; weights [n + 1]. */
-static void end_weights(unsigned n, unsigned k, bool upper, double *weights) {
-  for (unsigned j = 0; j <= n; j++) weights[j] = 0;
-  double factor = 1, binomial = 1;
-  for (unsigned j = 0; j < k; j++) factor *= n - j;
-  for (unsigned j = 0; j <= k; j++) {
-    unsigned from_end = upper ? n - j : j;
-    bool minus = upper ? j % 2 == 1 : (k - j) % 2 == 1;
-    weights[from_end] = (minus ? -factor : factor) * binomial;
-    binomial = binomial * (k - j) / (j + 1);
-  }
+/* Bezier points [degree + 1] become those of the derivative, times `unit`. */
+static void differentiate(unsigned degree, double unit, double (*column)[2]) {
+  for (unsigned k = 0; k < degree; k++)
+    for (size_t x = 0; x < 2; x++) column[k][x] = unit * degree * (column[k + 1][x] - column[k][x]);
 }
+
+/* What is no number is worse than all. */
+static void worsen(double *worst, double error) {
+  if (error > *worst || isnan(error)) *worst = error;
+}
+
+static double distance(const double a[2], const double b[2]) { return hypot(a[0] - b[0], a[1] - b[1]); }
 
 typedef struct gauge {
   const batten_loft *loft;
@@ -46,26 +48,26 @@ typedef struct gauge {
   double *interpolation, *continuity; /* [contours] */
 } gauge;
 
-/* At t at contour i: patches above and below it, which of them there are. */
+/* At t of contour i, with the patches below and above it; NULL where there is none. */
 static void compare_at(const gauge *g, size_t i, const strip *below, const strip *above, const strip *contour,
                        double t) {
-  const batten_loft *loft = g->loft;
-  static const double one[1] = {1};
-  unsigned n = loft->degree[1];
-  double weights[BSPLINE_ORDER], at[2], ends[2][2], stretch = 1, ratio = 0;
-  strip_at(contour, one, t, at);
-  if (below && above) ratio = (loft->heights[i] - loft->heights[i - 1]) / (loft->heights[i + 1] - loft->heights[i]);
-  for (unsigned k = 0; k <= loft->smoothness && (k == 0 || (below && above)); k++, stretch *= ratio) {
-    for (size_t e = 0; e < 2; e++) {
-      const strip *s = e ? above : below;
-      if (!s) continue;
-      end_weights(n, k, e == 0, weights);
-      strip_at(s, weights, t, ends[e]);
-      if (k == 0) g->interpolation[i] = fmax(g->interpolation[i], hypot(ends[e][0] - at[0], ends[e][1] - at[1]));
-    }
-    if (below && above)
-      g->continuity[i] =
-          fmax(g->continuity[i], hypot(stretch * ends[1][0] - ends[0][0], stretch * ends[1][1] - ends[0][1]));
+  unsigned n = g->loft->degree[1];
+  double at[1][2], lower[BSPLINE_ORDER][2], upper[BSPLINE_ORDER][2], *error = &g->interpolation[i];
+  column_at(contour, t, at);
+  if (below) {
+    column_at(below, t, lower);
+    worsen(error, distance(lower[n], at[0]));
+  }
+  if (above) {
+    column_at(above, t, upper);
+    worsen(error, distance(upper[0], at[0]));
+  }
+  if (!below || !above) return;
+  const double *z = g->loft->heights + i;
+  for (unsigned k = 0; k <= g->loft->smoothness; k++) {
+    worsen(&g->continuity[i], distance(lower[n - k], upper[0]));
+    differentiate(n - k, 1, lower);
+    differentiate(n - k, (z[0] - z[-1]) / (z[1] - z[0]), upper);
   }
 }
 
@@ -99,8 +101,8 @@ batten_status loft_measure(batten_context *ctx, const batten_loft *loft, const b
   batten_parallel(ctx, loft->contours, compare, &g);
   *interpolation = *continuity = 0;
   for (size_t i = 0; i < loft->contours; i++) {
-    *interpolation = fmax(*interpolation, g.interpolation[i]);
-    *continuity = fmax(*continuity, g.continuity[i]);
+    worsen(interpolation, g.interpolation[i]);
+    worsen(continuity, g.continuity[i]);
   }
   batten_free(ctx, worst);
   return BATTEN_OK;

@@ -316,6 +316,12 @@ static void measure(batten_context *ctx, scene *s, const batten_loft *loft) {
   else
     T_RATIO(fabs(moved[0] - 5), 1e-13, "an end moved away by 5");
   batten_loft_free(other);
+
+  s->control[2 * loft_at(&s->net, 0, s->slabs[0].space.count / 2, n)] = NAN;
+  T_OK(loft_make(ctx, &s->stack, &s->net, s->heights, s->control, &other), ctx);
+  T_OK(loft_measure(ctx, other, curves, &moved[0], &moved[1]), ctx);
+  T_CHECK(isnan(moved[0]) && isnan(moved[1]), "no numbers, no measures");
+  batten_loft_free(other);
 }
 
 /* The area of sections by the curves' own measure, over all z by the rule of Gauss and Legendre on halves of patches.
