@@ -380,15 +380,17 @@ static inline batten_curve *loft_scene_slope(batten_context *ctx, const loft_rul
 
 /* ---- stacks -------------------------------------------------------------------------------------- */
 
+/* Legs turn to and fro by up to half a right angle and some vertices hardly turn, so that without inequalities three
+ * of them turn the wrong way between contours. */
 static inline void loft_scene_paper(batten_context *ctx, loft_scene *out) {
   static const double breaks[4][5] = {
-      {0, 0.25, 0.5, 0.75, 1}, {0, 0.3, 0.6, 1}, {0, 0.2, 0.45, 0.8, 1}, {0, 0.4, 0.7, 1}};
+      {0, 0.15, 0.35, 0.7, 1}, {0, 0.4, 0.7, 1}, {0, 0.15, 0.35, 0.6, 1}, {0, 0.3, 0.6, 1}};
   static const size_t spans[4] = {4, 3, 4, 3};
   static const double points[4][6][2] = {
-      {{0, 0}, {0.02, 0.32}, {0.1, 0.62}, {0.42, 0.88}, {0.74, 0.97}, {1.04, 1}},
-      {{0.1, 0.05}, {-0.02, 0.5}, {0.28, 0.9}, {0.78, 0.86}, {1.1, 0.62}},
-      {{0.16, 0}, {0.05, 0.22}, {0.04, 0.6}, {0.42, 0.8}, {0.9, 0.72}, {1.12, 0.52}},
-      {{0.05, 0.1}, {0.1, 0.56}, {0.34, 0.82}, {0.66, 0.94}, {1.12, 0.98}}};
+      {{-0.22, 0.25}, {-0.23, 0.38}, {-0.02, 0.59}, {0.63, 0.78}, {1.21, 0.67}, {1.49, 0.5}},
+      {{1.54, -0.31}, {1.42, -0.04}, {1.42, 0.67}, {1.65, 1.15}, {1.85, 1.28}},
+      {{1.95, 0.81}, {1.99, 1}, {2.34, 1.04}, {2.72, 0.67}, {3.01, 0.32}, {3.29, -0.11}},
+      {{3.12, -0.24}, {3.05, 0.12}, {3.29, 0.57}, {3.77, 1.29}, {4.19, 1.4}}};
   for (size_t i = 0; i < 4; i++) {
     loft_scene_space s = {2, 1, false, spans[i], breaks[i]};
     out->contours[i] = loft_scene_curve(ctx, &s, points[i][0]);
