@@ -11,7 +11,7 @@
  * vertices.c     turns of the polygons at both contours, which signs must be kept
  * net.c          control points of all patches as functions of free unknowns: continuity [eq. 9] and flat points
  * spiral.c       legs that turn and stretch evenly: the points q of eq. 12
- * objective.c    eq. 12 and 13 as a sparse system; their minimum
+ * objective*.c   eq. 12 and 13 as a sparse system; their minimum
  * turns.c        what turns must keep [eq. 10, 11], and whether those of a surface do
  * rows.c         separators, and the inequalities that they give
  * program.c      the quadratic program, rigid or elastic

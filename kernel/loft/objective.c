@@ -3,19 +3,21 @@
  * With g_i = gap_i / mean gap, P the mean length of the contours' polygons, p_v(zeta) the leg v between two contours,
  * q_v its spiral and rho_v its mean length at both,
  *
- *   F = sum_i g_i sum_v 1 / (rho_v P) (mean_r |p_v(r / S) - q_v(r / S)|^2 + b int_0^1 |p_v''|^2)
+ *   F = sum_i g_i sum_v 1 / (rho_v P) (mean_r |p_v(r / S) - q_v(r / S)|^2 + a int_0^1 |p_v''|^2)
  *     + a sum_i 1 / g_i^3 sum_j w_j int_0^1 |d_j''|^2 / P^2.
  *
  * F has no unit: of a contour turned into one that is smaller by a part e the first sum is about e^2. Legs are as
  * long as their knot interval times x', so that 1 / rho_v makes the sum over legs an integral over t, and errors of
  * direction count alike on short and long legs. (With equal weights for all legs, as in the paper, short ones lose
- * their direction to errors that are nothing on long ones.) The tension of legs b is not in the paper: spirals have
+ * their direction to errors that are nothing on long ones.) The tension of legs is not in the paper: spirals have
  * kinks at contours, and what lies nearest to them turns as fast as continuity lets it, all at once beside the
- * contours; b rounds this to about b^(1/4) of a patch. The tension of trajectories a is int |d^2/dz^2 d_j|^2 dz times
- * (mean gap)^3 / P^2, so that stacks of other proportions of height to width have the same. w_j: 1 for the first and
- * the last trajectory; those of closed contours all have their part, the integral of their B-spline over t. So what
- * is left of the tension to the mean of x over t, which no leg says anything about and which is the same on any
- * knots, is that of a spline through the contours' means.
+ * contours; a rounds this to about a^(1/4) of a patch. The tension of trajectories is int |d^2/dz^2 d_j|^2 dz times
+ * (mean gap)^3 / P^2, so that stacks of other proportions of height to width have the same. (With 0.001 for a, random
+ * stacks bend by 1.1 to 1.3 times as much as with tension alone, where spirals alone bend by 2 to 6 times as much,
+ * and fewest of their sections have wrong turns: half as many as with spirals alone, and as with ten times the
+ * tension.) w_j: 1 for the first and the last trajectory; those of closed contours all have their part, the integral
+ * of their B-spline over t. So what is left of the tension to the mean of x over t, which no leg says anything about
+ * and which is the same on any knots, is that of a spline through the contours' means.
  *
  * The spiral is replaced by the polynomial b_v nearest to it at the r / S: up to a constant the mean of squares is
  * (e - b)' M (e - b), with the control points e of p_v and M = mean_r B_k(r / S) B_l(r / S). So values and gradients
@@ -26,41 +28,15 @@
 #include <string.h>
 
 #include "base/checked.h"
-#include "loft_inner.h"
-#include "sparse/block.h"
+#include "objective.h"
 
-enum { ORDER = BATTEN_SURFACE_DEGREE_MAX + 1, REFINEMENTS = 2 };
+enum { REFINEMENTS = 2 };
 
-/* The tension of legs for 1 of trajectories: with the default tension of 0.01 corners are rounded over a sixth of a
- * patch to either side. Random stacks then bend by 1.2 of what the smoothest surfaces do, where spirals alone bend by
- * 2 to 6 times as much, and as few sections have wrong turns as with these. Ten times more bends little less, and
- * every tenth turn is wrong. */
-static const double LEG_TENSION = 0.1;
 /* What is 0 of tension: without any the whole surface could shift. */
 static const double LEAST_TENSION = 1e-6;
 /* Legs count as no shorter than this part of what their knot interval has of the polygon: where they have no length
  * x' is nearly 0 and need not have a direction. And than this part of the polygon: 1 / rho has to leave digits. */
 static const double SHORT = 1e-3, SHORTEST = 1e-9;
-
-/* A quadratic form of the n + 1 control points of a polynomial. */
-typedef struct form {
-  double at[ORDER][ORDER];
-} form;
-
-struct loft_objective {
-  batten_context *ctx;
-  const loft_net *net;
-  bool closed;
-  double mean_gap, polygon; /* P */
-  double tension;           /* a */
-  form sampled, gram, bent; /* M; see make_bent */
-  size_t *leg_start;        /* [slab_count + 1] */
-  double *weight;           /* [legs] g / (rho P) */
-  double *target;           /* [legs][n + 1][2] b */
-  double constant;
-  block_matrix h;
-  block_plan *plan;
-};
 
 /* ---- Bernstein polynomials ----------------------------------------------------------------------- */
 
@@ -124,8 +100,6 @@ static void solve_small(unsigned n, form *factor, double (*x)[2]) {
 
 /* ---- legs and trajectories ----------------------------------------------------------------------- */
 
-static size_t after(const loft_space *s, size_t j) { return j + 1 == s->count ? 0 : j + 1; }
-
 /* Control points [n + 1][2] of trajectory j of patch i. */
 static void trajectory(const loft_net *net, const double *y, size_t i, size_t j, double (*out)[2]) {
   for (unsigned k = 0; k <= net->degree; k++) {
@@ -141,8 +115,7 @@ static void trajectory(const loft_net *net, const double *y, size_t i, size_t j,
 /* g of patch i. */
 static double relative_gap(const loft_objective *o, size_t i) { return o->net->slabs[i].gap / o->mean_gap; }
 
-/* Of trajectory j of patch i: a w / (g^3 P^2). */
-static double trajectory_weight(const loft_objective *o, size_t i, size_t j) {
+double objective_trajectory_weight(const loft_objective *o, size_t i, size_t j) {
   const loft_space *s = &o->net->slabs[i].space;
   double g = relative_gap(o, i), share;
   if (o->closed)
@@ -198,13 +171,13 @@ static double add_spiral(const loft_objective *o, size_t i, size_t v, double (*f
   double x[ORDER][2], near[ORDER][2], smooth[ORDER][2], sum;
   for (unsigned k = 0; k <= n; k++)
     for (unsigned c = 0; c < 2; c++) x[k][c] = to[k][c] - from[k][c];
-  sum = bend(o, o->weight[leg] * LEG_TENSION * o->tension, x, smooth);
+  sum = bend(o, o->weight[leg] * o->tension, x, smooth);
   for (unsigned k = 0; k <= n; k++)
     for (unsigned c = 0; c < 2; c++) x[k][c] -= target[2 * k + c];
   sum += weigh(n, o->weight[leg], &o->sampled, x, near);
   if (!force) return sum;
   double *ends[2] = {force + 2 * loft_at(net, i, v, 0),
-                     force + 2 * loft_at(net, i, after(&net->slabs[i].space, v), 0)};
+                     force + 2 * loft_at(net, i, objective_after(&net->slabs[i].space, v), 0)};
   for (unsigned e = 0; e < 2; e++) {
     push(n, e == 0 ? -1 : 1, near, ends[e]);
     push(n, e == 0 ? -1 : 1, smooth, ends[e]);
@@ -223,11 +196,11 @@ static double evaluate(const loft_objective *o, const double *y, double *force) 
     trajectory(net, y, i, 0, from);
     for (size_t j = 0; j < s->count; j++) {
       if (o->closed || j == 0 || j + 1 == s->count) {
-        sum += bend(o, trajectory_weight(o, i, j), from, bent);
+        sum += bend(o, objective_trajectory_weight(o, i, j), from, bent);
         if (force) push(n, 1, bent, force + 2 * loft_at(net, i, j, 0));
       }
       if (j == loft_legs(s)) break;
-      trajectory(net, y, i, after(s, j), to);
+      trajectory(net, y, i, objective_after(s, j), to);
       sum += add_spiral(o, i, j, from, to, force);
       memcpy(from, to, sizeof from);
     }
@@ -301,225 +274,6 @@ static batten_status make_targets(batten_context *ctx, unsigned samples, loft_ob
   return BATTEN_OK;
 }
 
-/* ---- the matrix ---------------------------------------------------------------------------------- */
-
-/* For every leg the unknowns that its two trajectories depend on: legs [leg][..]. */
-typedef struct incidence {
-  size_t legs, most; /* most unknowns of a leg */
-  size_t *starts;    /* [legs + 1] */
-  uint32_t *columns;
-} incidence;
-
-static void incidence_free(batten_context *ctx, incidence *a) {
-  batten_free(ctx, a->columns);
-  batten_free(ctx, a->starts);
-}
-
-/* Rows of net.z of leg v of patch i: n + 1 of each trajectory. */
-static size_t row_of(const loft_net *net, size_t i, size_t v, unsigned r) {
-  unsigned order = net->degree + 1;
-  size_t j = r < order ? v : after(&net->slabs[i].space, v);
-  return loft_at(net, i, j, r % order);
-}
-
-/* Unknowns of the leg, each once; columns may be NULL. seen [unknowns]: 1 + the last leg that met it. */
-static size_t list_unknowns(const loft_net *net, size_t i, size_t v, size_t stamp, size_t *seen, uint32_t *columns) {
-  size_t count = 0;
-  for (unsigned r = 0; r < 2 * (net->degree + 1); r++) {
-    size_t row = row_of(net, i, v, r);
-    for (size_t e = net->z.starts[row]; e < net->z.starts[row + 1]; e++) {
-      uint32_t column = net->z.indices[e];
-      if (seen[column] == stamp) continue;
-      seen[column] = stamp;
-      if (columns) columns[count] = column;
-      count++;
-    }
-  }
-  return count;
-}
-
-static batten_status incidence_make(batten_context *ctx, const loft_objective *o, incidence *out) {
-  const loft_net *net = o->net;
-  incidence a = {.legs = o->leg_start[net->slab_count]};
-  batten_status st = BATTEN_E_NOMEM;
-  size_t *seen = batten_alloc_array(ctx, net->z.columns, sizeof *seen), stamp = 0;
-  a.starts = batten_alloc_array(ctx, a.legs + 1, sizeof *a.starts);
-  if (!seen || !a.starts) goto done;
-  memset(seen, 0, net->z.columns * sizeof *seen);
-  a.starts[0] = 0;
-  for (size_t i = 0, leg = 0; i < net->slab_count; i++)
-    for (size_t v = 0; v < loft_legs(&net->slabs[i].space); v++, leg++) {
-      size_t count = list_unknowns(net, i, v, ++stamp, seen, NULL);
-      a.starts[leg + 1] = a.starts[leg] + count;
-      if (count > a.most) a.most = count;
-    }
-  a.columns = batten_alloc_array(ctx, a.starts[a.legs], sizeof *a.columns);
-  if (!a.columns) goto done;
-  for (size_t i = 0, leg = 0; i < net->slab_count; i++)
-    for (size_t v = 0; v < loft_legs(&net->slabs[i].space); v++, leg++)
-      list_unknowns(net, i, v, ++stamp, seen, a.columns + a.starts[leg]);
-  *out = a;
-  a = (incidence){0};
-  st = BATTEN_OK;
-done:
-  incidence_free(ctx, &a);
-  batten_free(ctx, seen);
-  return st;
-}
-
-/* The legs of every unknown: the transpose. */
-static batten_status transpose(batten_context *ctx, const incidence *a, size_t unknowns, incidence *out) {
-  incidence t = {.legs = unknowns};
-  t.starts = batten_alloc_array(ctx, unknowns + 2, sizeof *t.starts);
-  t.columns = batten_alloc_array(ctx, a->starts[a->legs], sizeof *t.columns);
-  if (!t.starts || !t.columns) {
-    incidence_free(ctx, &t);
-    return BATTEN_E_NOMEM;
-  }
-  memset(t.starts, 0, (unknowns + 2) * sizeof *t.starts);
-  for (size_t e = 0; e < a->starts[a->legs]; e++) t.starts[a->columns[e] + 2]++;
-  for (size_t p = 0; p < unknowns; p++) t.starts[p + 2] += t.starts[p + 1];
-  for (size_t leg = 0; leg < a->legs; leg++)
-    for (size_t e = a->starts[leg]; e < a->starts[leg + 1]; e++)
-      t.columns[t.starts[a->columns[e] + 1]++] = (uint32_t)leg;
-  *out = t;
-  return BATTEN_OK;
-}
-
-/* Pairs (p, q), q < p, of unknowns that meet in a leg, each once; pairs may be NULL. Returns how many. */
-static size_t list_pairs(const incidence *a, const incidence *t, size_t *seen, uint32_t *pairs) {
-  size_t count = 0;
-  memset(seen, 0, t->legs * sizeof *seen);
-  for (size_t p = 0; p < t->legs; p++)
-    for (size_t e = t->starts[p]; e < t->starts[p + 1]; e++)
-      for (size_t f = a->starts[t->columns[e]]; f < a->starts[t->columns[e] + 1]; f++) {
-        size_t q = a->columns[f];
-        if (q >= p || seen[q] == p) continue; /* 0 is smaller than none */
-        seen[q] = p;
-        if (pairs) {
-          pairs[2 * count] = (uint32_t)p;
-          pairs[2 * count + 1] = (uint32_t)q;
-        }
-        count++;
-      }
-  return count;
-}
-
-static batten_status make_pattern(batten_context *ctx, const incidence *a, size_t unknowns, block_matrix *h) {
-  incidence t = {0};
-  uint32_t *pairs = NULL;
-  size_t *seen = batten_alloc_array(ctx, unknowns, sizeof *seen);
-  batten_status st = seen ? transpose(ctx, a, unknowns, &t) : BATTEN_E_NOMEM;
-  if (st < 0) goto done;
-  size_t count = list_pairs(a, &t, seen, NULL);
-  st = BATTEN_E_NOMEM;
-  pairs = batten_alloc_array(ctx, count, 2 * sizeof *pairs);
-  if (!pairs) goto done;
-  list_pairs(a, &t, seen, pairs);
-  st = block_matrix_new(ctx, unknowns, 1, count, pairs, h);
-done:
-  batten_free(ctx, pairs);
-  incidence_free(ctx, &t);
-  batten_free(ctx, seen);
-  return st;
-}
-
-/* What a leg puts into the matrix: its unknowns and, as combinations of them, the control points of both trajectories
- * [count][n + 1]. */
-typedef struct element {
-  size_t count;
-  const uint32_t *columns;
-  double *from, *to, *leg, *product; /* [most][ORDER] each */
-} element;
-
-/* place [unknowns] is scratch. */
-static void load(const loft_net *net, size_t i, size_t v, size_t *place, element *t) {
-  unsigned order = net->degree + 1;
-  for (size_t p = 0; p < t->count; p++) place[t->columns[p]] = p;
-  memset(t->from, 0, t->count * order * sizeof *t->from);
-  memset(t->to, 0, t->count * order * sizeof *t->to);
-  for (unsigned r = 0; r < 2 * order; r++) {
-    size_t row = row_of(net, i, v, r);
-    double *into = (r < order ? t->from : t->to) + r % order;
-    for (size_t e = net->z.starts[row]; e < net->z.starts[row + 1]; e++)
-      into[place[net->z.indices[e]] * order] = net->z.values[e];
-  }
-  for (size_t k = 0; k < t->count * order; k++) t->leg[k] = t->to[k] - t->from[k];
-}
-
-/* h += rows a rows', rows [count][n + 1]. */
-static void add_element(const element *t, unsigned n, const form *a, const double *rows, block_matrix *h) {
-  unsigned order = n + 1;
-  for (size_t p = 0; p < t->count; p++)
-    for (unsigned l = 0; l <= n; l++) {
-      double sum = 0;
-      for (unsigned k = 0; k <= n; k++) sum += rows[p * order + k] * a->at[k][l];
-      t->product[p * order + l] = sum;
-    }
-  for (size_t p = 0; p < t->count; p++)
-    for (size_t q = 0; q <= p; q++) {
-      double sum = 0;
-      for (unsigned k = 0; k <= n; k++) sum += t->product[p * order + k] * rows[q * order + k];
-      if (sum == 0) continue;
-      *block_matrix_at(h, t->columns[p], t->columns[q]) += sum;
-      if (p != q) *block_matrix_at(h, t->columns[q], t->columns[p]) += sum;
-    }
-}
-
-static void add_leg(const loft_objective *o, size_t i, size_t v, const element *t, block_matrix *h) {
-  const loft_net *net = o->net;
-  const loft_space *s = &net->slabs[i].space;
-  unsigned n = net->degree;
-  form a;
-  double weight = 2 * o->weight[o->leg_start[i] + v];
-  for (unsigned k = 0; k <= n; k++)
-    for (unsigned l = 0; l <= n; l++)
-      a.at[k][l] = weight * (o->sampled.at[k][l] + LEG_TENSION * o->tension * o->bent.at[k][l]);
-  add_element(t, n, &a, t->leg, h);
-  bool ends[2] = {o->closed || v == 0, !o->closed && v + 2 == s->count};
-  for (size_t e = 0; e < 2; e++) {
-    if (!ends[e]) continue;
-    weight = 2 * trajectory_weight(o, i, v + e);
-    for (unsigned k = 0; k <= n; k++)
-      for (unsigned l = 0; l <= n; l++) a.at[k][l] = weight * o->bent.at[k][l];
-    add_element(t, n, &a, e == 0 ? t->from : t->to, h);
-  }
-}
-
-static batten_status make_matrix(batten_context *ctx, loft_objective *o) {
-  const loft_net *net = o->net;
-  incidence a = {0};
-  size_t *place = NULL;
-  double *work = NULL;
-  batten_status st = incidence_make(ctx, o, &a);
-  if (st >= 0) st = make_pattern(ctx, &a, net->z.columns, &o->h);
-  if (st < 0) goto done;
-  st = BATTEN_E_NOMEM;
-  size_t part = a.most * ORDER;
-  place = batten_alloc_array(ctx, net->z.columns, sizeof *place);
-  work = batten_alloc_array(ctx, part, 4 * sizeof *work);
-  if (!place || !work) goto done;
-  for (size_t i = 0, leg = 0; i < net->slab_count; i++) {
-    st = batten_progress(ctx, "objective", (double)i / (double)net->slab_count);
-    if (st < 0) goto done;
-    for (size_t v = 0; v < loft_legs(&net->slabs[i].space); v++, leg++) {
-      element t = {.count = a.starts[leg + 1] - a.starts[leg], .columns = a.columns + a.starts[leg]};
-      t.from = work;
-      t.to = work + part;
-      t.leg = work + 2 * part;
-      t.product = work + 3 * part;
-      load(net, i, v, place, &t);
-      add_leg(o, i, v, &t, &o->h);
-    }
-  }
-  st = BATTEN_OK;
-done:
-  batten_free(ctx, work);
-  batten_free(ctx, place);
-  incidence_free(ctx, &a);
-  return st;
-}
-
 /* ---- the whole ----------------------------------------------------------------------------------- */
 
 batten_status loft_objective_new(batten_context *ctx, const loft_stack *stack, const loft_net *net,
@@ -541,7 +295,7 @@ batten_status loft_objective_new(batten_context *ctx, const loft_stack *stack, c
   measure_stack(o);
   make_bent(net->degree, &o->gram, &o->bent);
   st = make_targets(ctx, opt->samples > net->degree ? opt->samples : net->degree, o);
-  if (st >= 0) st = make_matrix(ctx, o);
+  if (st >= 0) st = objective_make_matrix(ctx, o);
   if (st >= 0 && net->z.columns > 0) st = block_plan_new(ctx, &o->h, BLOCK_AUTO, &o->plan);
   if (st >= 0 && o->plan) st = block_factor(ctx, o->plan, &o->h, NULL);
   if (st == BATTEN_E_SINGULAR)

@@ -91,7 +91,7 @@ static double opinion(const fixture *f, double tension, unsigned samples, const 
         loft_spiral(s, v, zeta, q);
         near += (pow(p[0] - q[0], 2) + pow(p[1] - q[1], 2)) / (samples + 1);
       }
-      sum += g / (rho * polygon) * (near + 0.1 * tension * bending(n, leg));
+      sum += g / (rho * polygon) * (near + tension * bending(n, leg));
     }
     for (size_t j = 0; j < s->space.count; j++) {
       double share = j == 0 || j + 1 == s->space.count;

@@ -34,8 +34,9 @@ typedef struct batten_loft_options {
                             legs; what contours move by is told (knot_shift). Default 1e-12. */
   const batten_curve *slopes[2]; /* dy/dz at the first and the last contour, as curves over the contours' domain, of
                                     degree d at most, closed as the contours; NULL = free. Default NULL. */
-  double tension;   /* of the trajectories of first and last control points (closed: of all), beside the legs, >= 0;
-                       does   not depend on units. Default 0.01. */
+  double tension; /* of the legs of sections' polygons and the trajectories of first and last control points (closed:
+                     of all), against their bending by z, >= 0; does not depend on units. More: smoother from contour
+                     to contour, but with more to put right in the sections between. Default 0.001. */
   unsigned samples; /* S of eq. 12: heights in a patch at which legs are compared, >= degree. Default 20. */
 
   /* The inequalities. */
