@@ -5,6 +5,7 @@
  * piece.c      spans alone, integrals over them closest.c   nearest parameters
  * measure.c    area, centroid, turn, energy     extremes.c  box, curvature
  * bend.c       x' and [x', x''] with error bounds inflections.c  changes of sign
+ * crossings.c  where a curve crosses or touches itself
  * certify*.c   the proof of shape: like bend.c includes nothing of kernel/contour and not the blossoms of
  *              basis/bspline.c, with which its inequalities are made
  */
