@@ -64,6 +64,59 @@ static errors measure(batten_context *ctx, const loft_rule *rule, unsigned degre
   return e;
 }
 
+/* Points times 2^20, heights times 2^-7: the same bits. Over the domain [0, 8], turned by a right angle and moved by
+ * the size of the box: the same loft to rounding. */
+static void invariances(batten_context *ctx, bool closed) {
+  loft_rule rule = {.degree = 3,
+                    .smoothness = 2,
+                    .closed = closed,
+                    .contours = 5,
+                    .inflections = 2,
+                    .decades = 2,
+                    .rotation = 0.3,
+                    .seed = 5};
+  batten_loft_options opt = batten_loft_options_default();
+  opt.smoothness = rule.smoothness;
+  loft_scene first = loft_scene_make(ctx, &rule);
+  batten_loft *loft = NULL, *other = NULL;
+  double size, domain[2] = {0, 8}, scale[4] = {0x1p20, 0, 0, 0x1p20}, turn[4] = {0, -1, 1, 0};
+  T_OK(build(ctx, &first, 0, &opt, &loft, &size), ctx);
+  for (int moved = 0; moved < 2; moved++) {
+    double shift[2] = {moved ? size : 0, moved ? -size : 0}, apart = 0, other_size;
+    loft_scene scene = loft_scene_make(ctx, &rule);
+    for (size_t i = 0; i < scene.count; i++) {
+      batten_curve_free(scene.contours[i]);
+      scene.contours[i] = NULL;
+      T_OK(batten_curve_transform(ctx, first.contours[i], moved ? turn : scale, shift, moved ? domain : NULL,
+                                  &scene.contours[i]),
+           ctx);
+      if (!moved) scene.heights[i] *= 0x1p-7;
+    }
+    T_OK(build(ctx, &scene, 0, &opt, &other, &other_size), ctx);
+    bool same = true;
+    for (size_t i = 0; i + 1 < scene.count; i++) {
+      const loft_patch *a = &loft->patches[i], *b = &other->patches[i];
+      same = same && a->count == b->count;
+      for (size_t k = 0; same && k < a->count * (loft->degree[1] + 1); k++) {
+        const double *x = a->control + 2 * k, *y = b->control + 2 * k;
+        same = same && (moved || (y[0] == 0x1p20 * x[0] && y[1] == 0x1p20 * x[1]));
+        if (moved) apart = fmax(apart, hypot(y[0] - (shift[0] - x[1]), y[1] - (shift[1] + x[0])));
+      }
+      for (size_t k = 0; same && k < a->knot_count; k++)
+        same = same && (moved ? fabs(b->knots[k] - 8 * a->knots[k]) <= 1e-14 : b->knots[k] == a->knots[k]);
+    }
+    if (!moved)
+      T_CHECK(same, "%s: points times 2^20, heights times 2^-7: the same bits", closed ? "closed" : "open");
+    else
+      T_RATIO(same ? apart / size : INFINITY, 1e-12, "turned and moved, over another domain");
+    batten_loft_free(other);
+    other = NULL;
+    loft_scene_free(&scene);
+  }
+  batten_loft_free(loft);
+  loft_scene_free(&first);
+}
+
 int main(void) {
   batten_context *ctx = t_context(NULL, NULL, 2);
   for (unsigned d = 2; d <= 5; d++)
@@ -87,6 +140,7 @@ int main(void) {
                 closed ? "closed" : "open");
         T_RATIO(worst.continuity, 1e-11, "continuity");
       }
+  for (int closed = 0; closed < 2; closed++) invariances(ctx, closed);
   T_CHECK(batten_bytes_in_use(ctx) == 0, "nothing is left");
   batten_context_free(ctx);
   return t_done();
