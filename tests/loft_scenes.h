@@ -364,18 +364,21 @@ static inline batten_curve *loft_scene_contour(batten_context *ctx, const loft_r
   return out;
 }
 
-/* A smooth small curve for slopes. */
-static inline batten_curve *loft_scene_slope(batten_context *ctx, const loft_rule *r, uint64_t *state) {
-  double points[128], breaks[7];
-  for (size_t k = 0; k <= 6; k++) breaks[k] = (double)k / 6;
-  loft_scene_space s = {r->degree, r->degree - r->smoothness, r->closed, 6, breaks};
-  double phase = loft_scene_between(state, 0, 6), size = loft_scene_between(state, 0.05, 0.2);
-  for (size_t j = 0, count = loft_scene_count(&s); j < count; j++) {
-    double t = 2 * SCENE_PI * (double)j / (double)count;
-    points[2 * j] = size * cos(t + phase);
-    points[2 * j + 1] = size * sin(t + 2 * phase);
-  }
-  return loft_scene_curve(ctx, &s, points);
+/* Slopes that keep the shape of a contour: it is turned, stretched and moved. */
+static inline batten_curve *loft_scene_slope(batten_context *ctx, const batten_curve *contour, uint64_t *state) {
+  batten_curve_form form = batten_curve_get(contour);
+  size_t count = form.knot_count - form.degree - 1;
+  double *points = loft_scene_memory(2 * count, sizeof *points), map[6];
+  for (size_t k = 0; k < 6; k++) map[k] = loft_scene_between(state, -0.15, 0.15);
+  for (size_t j = 0; j < count; j++)
+    for (size_t c = 0; c < 2; c++)
+      points[2 * j + c] =
+          map[3 * c] * form.control_points[2 * j] + map[3 * c + 1] * form.control_points[2 * j + 1] + map[3 * c + 2];
+  form.control_points = points;
+  batten_curve *out = NULL;
+  if (batten_curve_create(ctx, &form, &out) < 0) abort();
+  free(points);
+  return out;
 }
 
 /* ---- stacks -------------------------------------------------------------------------------------- */
@@ -436,7 +439,8 @@ static inline loft_scene loft_scene_make(batten_context *ctx, const loft_rule *g
     out.contours[i] = cone;
     free(points);
   }
-  for (unsigned e = 0; r.slopes && e < 2; e++) out.slopes[e] = loft_scene_slope(ctx, &r, &state);
+  for (unsigned e = 0; r.slopes && e < 2; e++)
+    out.slopes[e] = loft_scene_slope(ctx, out.contours[e ? r.contours - 1 : 0], &state);
   return out;
 }
 
