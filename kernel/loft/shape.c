@@ -72,32 +72,36 @@ static double zone_end(const loft_space *s, const shape_places *places, size_t k
   return t + way * reach;
 }
 
-/* Whether sections there are to keep a sign: that of a neighbour for which the place is no partner. */
-static bool needs_zone(const loft_stack *s, size_t i, const shape_place *p, int way, double end) {
-  const loft_contour *c = s->contours + i;
-  int sign = way < 0 ? shape_sign(c, end, p->t) : shape_sign(c, p->t, end);
+/* Whether sections are to keep a sign somewhere on the span there: that of a neighbour for which the place is no
+ * partner. */
+static bool needs_zone(const loft_stack *s, size_t i, const shape_place *p, double end, double zone) {
+  enum { PARTS = 8 };
+  int sign = shape_sign(s->contours + i, p->t, end);
+  double part = (end - p->t) / zone / PARTS;
   for (int side = 0; side < 2; side++) {
     if (!has_neighbour(s, i, side) || p->partner[side] || sign == 0) continue;
     const loft_contour *other = s->contours + neighbour(i, side);
-    if (sign == (way < 0 ? shape_sign(other, end, p->t) : shape_sign(other, p->t, end))) return true;
+    for (int k = 0; k < PARTS; k++)
+      if (sign == shape_sign(other, p->t + k * part, p->t + (k + 1) * part)) return true;
   }
   return false;
 }
 
 /* Knots of contour i: flat places, and where zones end. */
-static batten_status add_knots(batten_context *ctx, loft_stack *s, size_t i, const shape_places *places, double zone,
+static batten_status add_knots(batten_context *ctx, loft_stack *s, size_t i, shape_places *places, double zone,
                                shape_knots *list) {
   const loft_space *space = &s->contours[i].space;
   unsigned fold = s->degree > 3 ? s->degree - 2 : 1;
   batten_status st = BATTEN_OK;
   for (size_t k = 0; k < places->count && st >= 0; k++) {
-    const shape_place *p = places->at + k;
+    shape_place *p = places->at + k;
     bool inner = s->closed || (p->t > 0 && p->t < 1);
     if (p->kind != SHAPE_FLAT && p->kind != SHAPE_BENT) continue;
     if (p->kind == SHAPE_FLAT && inner && s->degree > 2) st = shape_knots_add(ctx, list, p->t, fold);
     for (int way = -1; way <= 1 && st >= 0; way += 2) {
       double end = zone_end(space, places, k, way, zone);
-      if (isnan(end) || !needs_zone(s, i, p, way, end)) continue;
+      if (p->kind == SHAPE_BENT) *(way < 0 ? &p->from : &p->to) = isnan(end) ? p->t : end;
+      if (isnan(end) || (p->kind == SHAPE_FLAT && !needs_zone(s, i, p, end, zone))) continue;
       end = shape_wrap(space, end);
       if (s->closed || (end > 0 && end < 1)) st = shape_knots_add(ctx, list, end, fold);
     }

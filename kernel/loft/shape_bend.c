@@ -12,7 +12,7 @@ static const double PI = 3.14159265358979323846;
 static const double ROOM = 0.9;
 /* Turns below that (and below what rounding of points does) have no sign. */
 static const double STRAIGHT = 0x1p-33, STRAIGHT_ROUNDING = 0x1p-46;
-enum { ROUNDS = 10 };
+enum { ROUNDS = 40 };
 
 void shape_knots_free(batten_context *ctx, shape_knots *list) {
   batten_free(ctx, list->knots);
@@ -49,12 +49,15 @@ batten_status shape_knots_add(batten_context *ctx, shape_knots *list, double t, 
 
 enum { NOTHING = 0, BOTH = 2 }; /* else the sign */
 
-static bool has_bent_place(const shape_places *places, const loft_space *s, size_t span) {
+/* Whether the span is in the zone of an inflection that is not flat. */
+static bool is_free(const shape_places *places, const loft_space *s, size_t span) {
   for (size_t k = 0; k < places->count; k++) {
     const shape_place *p = places->at + k;
     if (p->kind != SHAPE_BENT) continue;
-    if (p->t >= s->breaks[span] && p->t <= s->breaks[span + 1]) return true;
-    if (s->closed && p->t == 0 && span + 1 == s->spans) return true;
+    for (int period = s->closed ? -1 : 0; period <= (s->closed ? 1 : 0); period++) {
+      double middle = (s->breaks[span] + s->breaks[span + 1]) / 2 + period;
+      if (middle >= p->from && middle <= p->to) return true;
+    }
   }
   return false;
 }
@@ -64,7 +67,7 @@ static void find_wanted(const loft_contour *c, const shape_places *places, signe
   size_t vertices = loft_vertices(s);
   for (size_t v = 0; v < vertices; v++) wanted[v] = NOTHING;
   for (size_t span = 0; span < s->spans; span++) {
-    if (has_bent_place(places, s, span)) continue;
+    if (is_free(places, s, span)) continue;
     int sign = shape_sign(c, s->breaks[span], s->breaks[span + 1]);
     for (size_t k = 0; k + 2 <= s->degree && sign != 0; k++) {
       signed char *w = wanted + (s->first[span] + k) % vertices;

@@ -16,7 +16,7 @@ typedef struct shape_place {
   double t;
   shape_kind kind;
   bool inflection;
-  double from, to;   /* of a straight piece */
+  double from, to;   /* of a straight piece; of the zone around a bent inflection, beyond [0, 1] too */
   int before, after; /* signs beside it, 0 beyond the ends of open ones, and of straight pieces */
   bool partner[2];   /* in the contour below, above */
 } shape_place;

@@ -70,6 +70,7 @@ int shape_sign(const loft_contour *c, double a, double b) {
   double most = 0;
   for (int k = 0; k < SAMPLES; k++) {
     double t = shape_wrap(&c->space, bspline_blend(a, b, (k + 0.5) / SAMPLES));
+    if (!(t >= 0 && t <= 1)) continue;
     double g = bend_at(c, shape_span(&c->space, t), t);
     if (fabs(g) > fabs(most)) most = g;
   }

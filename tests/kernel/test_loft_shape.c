@@ -20,13 +20,19 @@ static bool has_note(const loft_stack *s, batten_loft_remark remark, size_t cont
   return false;
 }
 
-/* Whether an inflection that is not flat lies in or beside [a, b]. */
-static bool is_bent(const loft_stack *s, size_t contour, double a, double b) {
+/* Whether [a, b] is in the zone of an inflection that is not flat, which is free: the part 0.1 of the given curve's
+ * span, or so far beyond a knot just beside it. */
+static bool is_bent(const loft_stack *s, size_t contour, const batten_curve *curve, double a, double b) {
+  batten_curve_form f = batten_curve_get(curve);
   for (size_t k = 0; k < s->note_count; k++) {
     const batten_loft_note *n = s->notes + k;
-    double t = (n->t - s->domain[0]) / (s->domain[1] - s->domain[0]);
     if (n->remark != BATTEN_LOFT_NOT_FLAT || n->contour != contour) continue;
-    if ((t > a - 1e-9 && t < b + 1e-9) || (s->closed && t + 1 < b + 1e-9)) return true;
+    double reach = 0;
+    for (size_t j = 0; j + 1 < f.knot_count; j++) {
+      double from = f.knots[j], to = f.knots[j + 1];
+      if (n->t >= from - 0.1 * (to - from) && n->t <= to + 0.1 * (to - from)) reach = fmax(reach, 0.2 * (to - from));
+    }
+    if (fabs(n->t - (a + b) / 2) <= reach) return true;
   }
   return false;
 }
@@ -60,7 +66,8 @@ static void check_vertices(batten_context *ctx, const loft_stack *s, batten_curv
     for (size_t span = 0; span < space->spans; span++) {
       double a = space->breaks[span], b = space->breaks[span + 1];
       int signs[2];
-      for (size_t e = 0; e < 2; e++) signs[e] = is_bent(s, i + e, a, b) ? 0 : curve_sign(ctx, contours[i + e], a, b);
+      for (size_t e = 0; e < 2; e++)
+        signs[e] = is_bent(s, i + e, contours[i + e], a, b) ? 0 : curve_sign(ctx, contours[i + e], a, b);
       if (signs[0] == 0 || signs[0] != signs[1]) continue;
       for (size_t k = 0; k + 2 <= s->degree; k++)
         for (size_t e = 0; e < 2; e++) {
@@ -122,9 +129,71 @@ static void test_random(batten_context *ctx) {
   T_RATIO((double)all.inserted, 0.25 * (double)all.points, "knots inserted, of control points");
 }
 
+/* A contour with random control points: many inflections, none flat. Knots at random. */
+static batten_curve *make_wild(batten_context *ctx, uint64_t *state, unsigned degree, size_t spans, double calm) {
+  double knots[64], points[2 * 64];
+  size_t count = 0;
+  double at = 0, breaks[16];
+  for (size_t k = 0; k < spans; k++) breaks[k] = at += 0.05 + t_uniform(state);
+  for (unsigned k = 0; k <= degree; k++) knots[count++] = 0;
+  for (size_t k = 0; k + 1 < spans; k++)
+    for (unsigned f = 0; f < (degree > 3 ? degree - 2 : 1); f++) knots[count++] = breaks[k] / at;
+  for (unsigned k = 0; k <= degree; k++) knots[count++] = 1;
+  for (size_t j = 0; j + degree + 1 < count; j++) {
+    double greville = 0;
+    for (unsigned k = 1; k <= degree; k++) greville += knots[j + k] / degree;
+    points[2 * j] = 2 * calm * greville + t_uniform(state);
+    points[2 * j + 1] = t_uniform(state);
+  }
+  batten_curve *out = NULL;
+  if (batten_curve_create(ctx, &(batten_curve_form){degree, count, knots, points, 0}, &out) < 0) abort();
+  return out;
+}
+
+static void test_wild(batten_context *ctx) {
+  tally all = {0};
+  size_t failed = 0, notes = 0, inflections = 0;
+  uint64_t state = 11;
+  size_t by_degree[10][4] = {{0}};
+  for (unsigned trial = 0; trial < 64; trial++) {
+    unsigned degree = 2 + trial % 8;
+    batten_curve *contours[3];
+    const double heights[3] = {0, 1, 3};
+    for (size_t i = 0; i < 3; i++) contours[i] = make_wild(ctx, &state, degree, 2 + trial % 5, trial % 3);
+    const batten_loft_options opt = batten_loft_options_default();
+    loft_stack s = {0};
+    batten_status st = prepare(ctx, 3, contours, heights, &opt, &s);
+    if (st < 0) {
+      failed += !strstr(batten_error(ctx), "runs against");
+      if (!strstr(batten_error(ctx), "runs against")) printf("# trial %u: %s\n", trial, batten_error(ctx));
+    } else {
+      check_vertices(ctx, &s, contours, &all);
+      all.inserted += s.knots_inserted;
+      for (size_t i = 0; i < 3; i++) all.points += s.contours[i].space.count;
+      for (size_t i = 0; i < 3; i++) notes += has_note(&s, BATTEN_LOFT_STEEP, i);
+      inflections += s.inflections;
+      by_degree[degree][0] += s.knots_inserted;
+      for (size_t i = 0; i < 3; i++) by_degree[degree][1] += batten_curve_get(contours[i]).knot_count - degree - 1;
+      for (size_t i = 0; i < 3; i++) by_degree[degree][2] += has_note(&s, BATTEN_LOFT_STEEP, i);
+      by_degree[degree][3] += s.inflections;
+      loft_stack_free(ctx, &s);
+    }
+    for (size_t i = 0; i < 3; i++) batten_curve_free(contours[i]);
+  }
+  for (unsigned d = 2; d < 10; d++)
+    printf("# degree %u: %zu knots inserted into contours of %zu points, %zu of 24 steep, %zu inflections\n", d,
+           by_degree[d][0], by_degree[d][1], by_degree[d][2], by_degree[d][3]);
+  T_CHECK(failed == 0, "wild contours are prepared, %zu inflections", inflections);
+  T_CHECK(all.wrong == 0, "polygons bend as the curves at %zu of %zu vertices, largest turn %.3g of what is allowed",
+          all.checked - all.wrong, all.checked, all.turn);
+  T_CHECK(notes < 10, "steep contours: %zu", notes);
+  T_RATIO((double)all.inserted, 20 * (double)inflections, "knots inserted, by inflections");
+}
+
 int main(void) {
   batten_context *ctx = t_context(NULL, NULL, 1);
   test_random(ctx);
+  test_wild(ctx);
   T_CHECK(batten_bytes_in_use(ctx) == 0, "nothing is left");
   batten_context_free(ctx);
   return t_done();
