@@ -10,19 +10,19 @@
 #include "base/checked.h"
 #include "contour/contour_inner.h"
 
-/* Above that of single fits: slices of few points have the knots of those that need most, and between its points a
- * curve must not run away. On slices that have the points for their knots it changes distances by 1e-3 of them. */
-static const double TENSION = 1e-4;
+/* Slices of few points have the knots of those that need most, and between its points a curve must not run away: as
+ * many points as unknowns get this tension, four times as many hardly any. */
+static const double TENSION = 1e-4, TENSION_POWER = 4;
 
 batten_loft_match_options batten_loft_match_options_default(void) {
-  batten_loft_match_options o = {.struct_size = sizeof(batten_loft_match_options),
-                                 .fit = batten_contour_options_default(),
-                                 .orient = 1,
-                                 .align = 1,
-                                 .features = 1};
-  o.fit.tension = TENSION;
-  return o;
+  return (batten_loft_match_options){.struct_size = sizeof(batten_loft_match_options),
+                                     .fit = batten_contour_options_default(),
+                                     .orient = 1,
+                                     .align = 1,
+                                     .features = 1};
 }
+
+enum { ATTEMPTS = 4 }; /* to meet a tolerance */
 
 /* ---- checks -------------------------------------------------------------------------------------- */
 
@@ -119,6 +119,13 @@ static void note_fit(const match_slice *slice, size_t i, const batten_contour_in
   out->worst_misfit_slice = i;
 }
 
+/* At least what is asked for. */
+static double tension_of(const match_slice *slice, const batten_contour_options *o) {
+  double fold = o->degree - o->smoothness, unknowns = fold * (double)(o->break_count + 1);
+  if (!o->closed) unknowns += o->smoothness + 1;
+  return fmax(o->tension, TENSION * fmin(1, pow(unknowns / (double)slice->count, TENSION_POWER)));
+}
+
 static batten_status fit_slice(batten_context *ctx, const match_stack *s, size_t i,
                                const batten_contour_options *base, double *inflections, outcome *out) {
   const match_slice *slice = s->slices + i;
@@ -128,6 +135,7 @@ static batten_status fit_slice(batten_context *ctx, const match_stack *s, size_t
   o.weights = slice->weights;
   o.domain[0] = 0;
   o.domain[1] = 1;
+  o.tension = tension_of(slice, base);
   o.inflection_count = slice->bend_count;
   o.inflections = inflections;
   match_inflections(s, i, inflections, &o.sign);
@@ -144,24 +152,42 @@ static void free_curves(size_t count, batten_curve **curves) {
   }
 }
 
-static batten_status fit_all(batten_context *ctx, const match_stack *s, const batten_contour_options *fit,
-                             outcome *out) {
-  batten_contour_options o = *fit;
-  size_t most = 1;
-  double *inflections = NULL, *breaks = NULL;
-  for (size_t i = 0; i < s->count; i++)
-    if (s->slices[i].bend_count > most) most = s->slices[i].bend_count;
-  batten_status st = match_breaks(ctx, s, fit, 1, &o.break_count, &breaks);
-  if (st < 0) return st;
-  o.breaks = breaks;
-  inflections = batten_alloc_array(ctx, most, sizeof *inflections);
-  if (!inflections) st = BATTEN_E_NOMEM;
+/* All slices on `breaks`: *met: within the tolerance, or there is none. */
+static batten_status fit_each(batten_context *ctx, const match_stack *s, const batten_contour_options *fit,
+                              double *inflections, bool *met, outcome *out) {
+  batten_status st = BATTEN_OK;
+  *out = (outcome){.curves = out->curves, .unproven = MATCH_NONE};
   for (size_t i = 0; i < s->count && st >= 0; i++) {
     st = batten_progress(ctx, "slices", 0.5 + 0.5 * (double)i / (double)s->count);
-    if (st >= 0) st = fit_slice(ctx, s, i, &o, inflections, out);
+    if (st >= 0) st = fit_slice(ctx, s, i, fit, inflections, out);
   }
+  *met = fit->tolerance <= 0 || out->info.max_error <= fit->tolerance;
+  return st;
+}
+
+/* A tolerance was met by fits without inequalities and on knots of their own: where it is not met now, knots become
+ * denser, as often as helps; the last curves are what there is. */
+static batten_status fit_all(batten_context *ctx, const match_stack *s, const batten_contour_options *fit,
+                             outcome *out) {
+  static const double SHARED = 1.25, DENSER = 1.4; /* knots that are shared lie less well than own ones */
+  size_t most = 1;
+  bool met = false;
+  for (size_t i = 0; i < s->count; i++)
+    if (s->slices[i].bend_count > most) most = s->slices[i].bend_count;
+  double *inflections = batten_alloc_array(ctx, most, sizeof *inflections), *sum = NULL;
+  double crowding = fit->spans > 0 || fit->tolerance > 0 ? 1 : SHARED;
+  batten_status st = inflections ? match_density(ctx, s, fit, &sum) : BATTEN_E_NOMEM;
+  for (int attempt = 0; attempt < ATTEMPTS && st >= 0 && !met; attempt++, crowding *= DENSER) {
+    batten_contour_options o = *fit;
+    double *breaks = NULL;
+    st = match_breaks(ctx, s, fit, sum, crowding, &o.break_count, &breaks);
+    o.breaks = breaks;
+    free_curves(s->count, out->curves);
+    if (st >= 0) st = fit_each(ctx, s, &o, inflections, &met, out);
+    batten_free(ctx, breaks);
+  }
+  batten_free(ctx, sum);
   batten_free(ctx, inflections);
-  batten_free(ctx, breaks);
   return st;
 }
 

@@ -72,10 +72,13 @@ batten_status match_parameters(batten_context *ctx, match_stack *s);
 /* Inflections of slice i by t, [bend_count] ascending in [0, 1], and the sign at the start. */
 void match_inflections(const match_stack *s, size_t i, double *inflections, int *sign);
 
+/* How densely slices ask for breaks, batten's: handed to match_breaks. Fails: NOMEM, TOO_LARGE, CANCELLED. */
+batten_status match_density(batten_context *ctx, const match_stack *s, const batten_contour_options *fit,
+                            double **density);
 /* Inner breaks [*count] of all slices, the lines among them, batten's; crowding >= 1: so many times more than slices
- * ask for. Fails: NOMEM, CANCELLED. */
+ * ask for. Fails: NOMEM. */
 batten_status match_breaks(batten_context *ctx, const match_stack *s, const batten_contour_options *fit,
-                           double crowding, size_t *count, double **breaks);
+                           const double *density, double crowding, size_t *count, double **breaks);
 
 /* The text of a failure in slice i, told as that. */
 batten_status match_fail_in(batten_context *ctx, size_t i, batten_status st);

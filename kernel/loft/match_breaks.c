@@ -3,14 +3,12 @@
  * Each slice is asked for the knots that it would have of its own (kernel/contour/knots.c). How densely these lie is
  * averaged over slices with a high power, which comes near to the largest that any slice asks for without counting
  * single ones fully; knots divide the integral of that evenly between the lines of inflections, which are knots. */
-#include <string.h>
-
 #include "base/checked.h"
 #include "contour/contour_inner.h"
 #include "match.h"
 
 enum { CELLS = 1024 };
-static const double POWER = 6;
+static const double POWER = 8;
 
 /* Pieces per unit of t that a slice asks for, by cells. */
 static void add_density(size_t pieces, const double *breaks, double part, double *sum) {
@@ -107,7 +105,7 @@ static void fill_breaks(const match_stack *s, const double *sum, const size_t *c
 }
 
 /* From powers by cells to sums, [CELLS + 1]. */
-static void add_up(const batten_contour_options *fit, double crowding, double *sum) {
+static void add_up(const batten_contour_options *fit, double *sum) {
   double total = 0;
   for (size_t c = 0; c < CELLS; c++) {
     double density = pow(sum[c], 1 / POWER) / CELLS;
@@ -115,29 +113,41 @@ static void add_up(const batten_contour_options *fit, double crowding, double *s
     total += density;
   }
   sum[CELLS] = total;
-  double factor = crowding * (fit->spans > 0 ? (double)fit->spans / total : 1);
-  for (size_t c = 0; c <= CELLS; c++) sum[c] *= factor;
+  for (size_t c = 0; c <= CELLS && fit->spans > 0; c++) sum[c] *= (double)fit->spans / total;
+}
+
+batten_status match_density(batten_context *ctx, const match_stack *s, const batten_contour_options *fit,
+                            double **sum) {
+  size_t most = 1;
+  for (size_t i = 0; i < s->count; i++)
+    if (s->slices[i].bend_count > most) most = s->slices[i].bend_count;
+  double *result = batten_alloc_array(ctx, CELLS + 1, sizeof *result);
+  double *inflections = batten_alloc_array(ctx, most, sizeof *inflections);
+  batten_status st = result && inflections ? BATTEN_OK : BATTEN_E_NOMEM;
+  for (size_t c = 0; c <= CELLS && st >= 0; c++) result[c] = 0;
+  for (size_t i = 0; i < s->count && st >= 0; i++) {
+    st = batten_progress(ctx, "slices", 0.3 + 0.2 * (double)i / (double)s->count);
+    if (st >= 0) st = ask_slice(ctx, s, i, fit, inflections, result);
+  }
+  if (st >= 0) {
+    add_up(fit, result);
+    *sum = result;
+    result = NULL;
+  }
+  batten_free(ctx, inflections);
+  batten_free(ctx, result);
+  return st;
 }
 
 batten_status match_breaks(batten_context *ctx, const match_stack *s, const batten_contour_options *fit,
-                           double crowding, size_t *count, double **breaks) {
-  size_t most = 1, spans;
-  for (size_t i = 0; i < s->count; i++)
-    if (s->slices[i].bend_count > most) most = s->slices[i].bend_count;
-  double *sum = batten_alloc_array(ctx, CELLS + 1, sizeof *sum), *result = NULL;
-  double *inflections = batten_alloc_array(ctx, most, sizeof *inflections);
+                           const double *density, double crowding, size_t *count, double **breaks) {
+  double *sum = batten_alloc_array(ctx, CELLS + 1, sizeof *sum);
   size_t *counts = batten_alloc_array(ctx, s->line_count + 1, sizeof *counts);
-  batten_status st = sum && inflections && counts ? BATTEN_OK : BATTEN_E_NOMEM;
+  batten_status st = sum && counts ? BATTEN_OK : BATTEN_E_NOMEM;
   if (st < 0) goto done;
-  memset(sum, 0, (CELLS + 1) * sizeof *sum);
-  for (size_t i = 0; i < s->count && st >= 0; i++) {
-    st = batten_progress(ctx, "slices", 0.3 + 0.2 * (double)i / (double)s->count);
-    if (st >= 0) st = ask_slice(ctx, s, i, fit, inflections, sum);
-  }
-  if (st < 0) goto done;
-  add_up(fit, crowding, sum);
-  spans = count_spans(s, fit, sum, counts);
-  result = batten_alloc_array(ctx, spans, sizeof *result);
+  for (size_t c = 0; c <= CELLS; c++) sum[c] = crowding * density[c];
+  size_t spans = count_spans(s, fit, sum, counts);
+  double *result = batten_alloc_array(ctx, spans, sizeof *result);
   st = result ? BATTEN_OK : BATTEN_E_NOMEM;
   if (st < 0) goto done;
   fill_breaks(s, sum, counts, result);
@@ -145,7 +155,6 @@ batten_status match_breaks(batten_context *ctx, const match_stack *s, const batt
   *breaks = result;
 done:
   batten_free(ctx, counts);
-  batten_free(ctx, inflections);
   batten_free(ctx, sum);
   return st;
 }

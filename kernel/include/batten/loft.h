@@ -156,8 +156,8 @@ typedef struct batten_loft_match_options {
   batten_contour_options fit; /* of each slice: degree, smoothness, closed, weights, significance, spans, tolerance,
                                  rounds and what the inequalities need; parameters, breaks, inflections, sign, ends
                                  must be as in its default: they are found here. With spans = tolerance = 0: as many
-                                 as the slices speak for. Default: that of contours, but tension 1e-4, so that slices
-                                 of few points stay calm on the knots of others. */
+                                 as the slices speak for. Slices that have hardly more points than unknowns get
+                                 more tension, up to 1e-4, so that they stay calm on the knots of others. */
   int orient;                 /* non-zero: slices that run against the first one are reversed. Default 1. */
   int align;                  /* non-zero, closed slices: begin where neighbours begin. Default 1. */
   int features; /* non-zero: inflections of neighbours that belong together get one parameter. Default 1. */
