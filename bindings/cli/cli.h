@@ -20,6 +20,7 @@ int cli_qp(int argc, char **argv);
 int cli_network(int argc, char **argv);
 int cli_convex(int argc, char **argv);
 int cli_curve(int argc, char **argv);
+int cli_loft(int argc, char **argv);
 int cli_inspect(int argc, char **argv);
 
 /* ---- options.c: one table gives the parser and the help ---- */
@@ -104,6 +105,8 @@ typedef enum cli_output_kind {
   CLI_OUTPUT_CURVE_FREE, /* the same, to compare with */
   CLI_OUTPUT_PROPOSAL,   /* inflections as the data propose them */
   CLI_OUTPUT_PLOTS,      /* pictures in the plane */
+  CLI_OUTPUT_CONTOURS,   /* of a loft, as curves */
+  CLI_OUTPUT_SECTIONS,   /* with sections between them */
   CLI_OUTPUT_QP,
   CLI_OUTPUT_QP_SOLUTION
 } cli_output_kind;

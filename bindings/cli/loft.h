@@ -4,6 +4,49 @@
 
 #include "cli.h"
 
+typedef struct loft_request {
+  cli_request common;
+  batten_loft_options options;
+  batten_loft_match_options match;
+  batten_write_surface_options write;
+  batten_picture_options picture;
+  double slopes[2][2]; /* NaN = free */
+  double gap;          /* between contours of files that tell no heights; NaN = not given */
+  size_t between;      /* sections between neighbouring contours that --sections writes */
+  bool fit_options;    /* some option says how slices are to be fitted */
+} loft_request;
+
+typedef struct loft_work {
+  loft_request *request;
+  cli_run run;
+  size_t count;
+  batten_curve **contours; /* [count] */
+  double *heights;         /* [count] ascending */
+  batten_plane base;       /* where they begin */
+  bool planar;             /* the file knows of no planes: heights are along z */
+  bool matched;            /* the contours come from slices */
+  batten_loft_match_info match;
+  batten_curve *slopes[2];
+  batten_loft *loft, *unconstrained;
+  batten_loft_info info;
+  batten_loft_measures measures;
+  batten_status status; /* the first warning */
+  double time_read_s, time_match_s, time_measure_s, time_write_s;
+} loft_work;
+
+/* ---- loft_input.c: contours with heights, of slices or curves ------------------------------------ */
+
+batten_status loft_read(loft_work *w);
+
+/* ---- loft_files.c: what is written --------------------------------------------------------------- */
+
+batten_status loft_write(loft_work *w, const cli_output *f);
+
+/* ---- loft_report.c ------------------------------------------------------------------------------- */
+
+void loft_report(const loft_work *w, cli_report *r);
+void loft_summary(const loft_work *w);
+
 /* ---- loft_picture.c ------------------------------------------------------------------------------ */
 
 /* What is drawn: contours, and the patches between them with u = t, v = height, of one span in v, as

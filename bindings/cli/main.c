@@ -16,6 +16,7 @@ static const command commands[] = {
     {"solid", cli_solid, "solid from scattered surface points: mesh, picture, report"},
     {"convex", cli_convex, "convex surface or function from scattered points: STEP, mesh, picture, report"},
     {"curve", cli_curve, "planar curves of wanted inflections through points: STEP, SVG, picture, report"},
+    {"loft", cli_loft, "surface through contours whose sections keep their shape: STEP, mesh, picture, report"},
     {"network", cli_network, "smooth G1 surface through a triangle mesh: STEP, mesh, picture, report"},
     {"qp", cli_qp, "convex quadratic program: QPS, JSON and MATLAB files"},
     {"inspect", cli_inspect, "what is in a file, and its measures"},

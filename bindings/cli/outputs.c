@@ -153,6 +153,8 @@ static const rule *rule_of(cli_output_kind kind) {
        ".step .iges .json .vtu, or of a mesh .ply .obj .stl .off .vtp .vtk"},
       {CLI_OUTPUT_CURVE, curve_formats, "-o", ".json .step .iges .svg .vtu .vtp .vtk .csv"},
       {CLI_OUTPUT_CURVE_FREE, curve_formats, "--unconstrained", ".json .step .iges .svg .vtu .vtp .vtk .csv"},
+      {CLI_OUTPUT_CONTOURS, curve_formats, "--contours", ".json .step .iges .svg .vtu .vtp .vtk .csv"},
+      {CLI_OUTPUT_SECTIONS, curve_formats, "--sections", ".json .step .iges .svg .vtu .vtp .vtk .csv"},
       {CLI_OUTPUT_PROPOSAL, proposal_formats, "--proposal", ".json"},
       {CLI_OUTPUT_PLOTS, plane_picture_formats, "--picture", ".png or .svg"},
       {CLI_OUTPUT_QP, qp_formats, "--write", ".qps or .json"},
