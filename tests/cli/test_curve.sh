@@ -163,7 +163,7 @@ is i.json kind curves
 # ---- report, threads, pictures ------------------------------------------------------------------
 
 for key in $(sed -n -e '/^## Common/,/^## batten solid/s/^| \(`[^|]*`\) |.*/\1/p' \
-  -e '/^### Curves/,/^## batten convex/s/^| \(`[^|]*`\) |.*/\1/p' -e '/^## batten curve/,/^## batten network/s/^| \(`[^|]*`\) |.*/\1/p' "$root/docs/report.md" | tr -d '`'); do
+  -e '/^### Curves/,/^## batten convex/s/^| \(`[^|]*`\) |.*/\1/p' -e '/^## batten curve/,/^## batten loft/s/^| \(`[^|]*`\) |.*/\1/p' "$root/docs/report.md" | tr -d '`'); do
   echo "$key"
 done | sort >documented
 for file in $report stack.report.json; do
