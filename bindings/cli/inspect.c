@@ -131,16 +131,20 @@ static batten_status tell_surface(cli_run *run, const char *path, bool print, cl
   batten_surface *surface = NULL;
   batten_surface_measures m;
   batten_convexity c;
+  batten_sections sections;
+  bool plane = false;
   batten_status st = batten_read_surface(run->ctx, path, &surface);
   if (st < 0) return st;
   st = batten_surface_measure(run->ctx, surface, &m);
   if (st >= 0) st = batten_surface_certify_convex(run->ctx, surface, NULL, &c);
+  if (st >= 0) st = surface_prove_sections(run->ctx, surface, &plane, &sections);
   if (st >= 0) {
     batten_surface_form form = batten_surface_get(surface);
     cli_run_clear(run);
     cli_report_count(r, "dimension", 3);
     surface_report_form(&form, r);
     surface_report_convexity(&c, r);
+    surface_report_sections(plane, &sections, r);
     surface_report_measures(&m, r);
     if (print) {
       surface_print_form(&form);
@@ -148,6 +152,7 @@ static batten_status tell_surface(cli_run *run, const char *path, bool print, cl
                form.knots[1][0], form.knots[1][form.knot_count[1] - 1]);
       surface_print_measures(&m);
       surface_print_convexity(&c);
+      if (plane) surface_print_sections(&sections);
     }
   }
   batten_surface_free(surface);
