@@ -155,7 +155,7 @@ static batten_status read_slices(loft_work *w) {
 batten_status loft_read(loft_work *w) {
   double start = batten_now();
   batten_file_kind kind;
-  batten_status st = batten_identify(w->run.ctx, w->request->common.input, &kind);
+  batten_status st = batten_file_identify(w->run.ctx, w->request->common.input, &kind);
   if (st < 0) return st;
   st = kind == BATTEN_FILE_CURVES ? read_curves(w) : read_slices(w);
   w->time_read_s = batten_now() - start - w->time_match_s;
