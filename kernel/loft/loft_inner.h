@@ -239,6 +239,7 @@ typedef struct loft_piece {
   double from, to;
   double w[LOFT_FIELD + 1][2]; /* Bernstein */
   loft_bound bound;
+  double turn;   /* the smaller one of both contours, radians */
   double inside; /* by which inequalities are raised: what solvers leave shall be inside */
   uint64_t used; /* inequalities that are in the program */
 } loft_piece;
@@ -279,13 +280,13 @@ typedef struct loft_rows {
 void loft_rows_free(batten_context *ctx, loft_rows *r);
 /* Inequalities that a vertex has for each piece. */
 size_t loft_rows_each(const loft_net *net);
-/* Adds the inequalities of piece that `control` satisfies by less than `near` - gives, and that are not used yet; what
- * only says something of the contours is left out. *least: smallest value less its lower side, of all. */
+/* Where `control` satisfies an inequality of a piece by less than `below`: adds all of them that it satisfies by less
+ * than `near` and that are not used yet, but for those that only say something of the contours. Fails: NOMEM. */
 batten_status loft_rows_add(batten_context *ctx, const loft_net *net, const double *control, loft_piece *piece,
-                            double near, loft_rows *rows, double *least);
+                            double below, double near, loft_rows *rows);
 
 /* The minimum of the objective under rows, where the groups [groups] of them give way, by `give` radians, rather than
- * cost more than `weight` for each. Unknowns are those near to the rows, `reach` steps in the Hessian. Not the minimum
+ * cost more than weight times `costs` for each. Unknowns are those near to the rows, `reach` steps in the Hessian. Not the minimum
  * but another point: BATTEN_W_ACCURACY. Fails: NOMEM, TOO_LARGE, CANCELLED. */
 typedef struct loft_program {
   batten_qp_workspace *workspace;
@@ -295,8 +296,8 @@ typedef struct loft_program {
   unsigned reach;
   size_t iterations;
 } loft_program;
-batten_status loft_program_solve(batten_context *ctx, loft_program *p, const loft_rows *rows, size_t groups, double *y,
-                                 double *give);
+batten_status loft_program_solve(batten_context *ctx, loft_program *p, const loft_rows *rows, size_t groups,
+                                 const double *costs, double *y, double *give);
 
 /* Where there is no solution: by how much the turn at a vertex fails. */
 typedef struct loft_elastic {

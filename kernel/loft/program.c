@@ -5,7 +5,7 @@
  * contour and from knot to knot by constant factors. So d is 0 but for unknowns within a few steps of the rows in the
  * graph of H. All rows with an unknown among these are in the program, as they are at d = 0 for the others.
  *
- * The inequalities of a vertex may give way together by g >= 0 at the cost of weight (g + g^2 / 2): as long as the
+ * The inequalities of a vertex may give way together by g >= 0 at a cost of weight (g + g^2 / 2): as long as the
  * weight is above the multipliers, as little as can be, and 0 where there is a solution. So a program always has one.
  *
  * Unknowns are scaled by powers of two to a diagonal of about one. */
@@ -20,11 +20,13 @@ typedef struct work {
   batten_context *ctx;
   const loft_program *p;
   const loft_rows *rows;
+  const double *costs;
   size_t unknowns, inside, groups, variables;
   uint32_t *local; /* [unknowns] number in the program, or OUTSIDE */
   uint32_t *whole; /* [inside] and back */
   uint32_t *slack; /* [groups] variable, or OUTSIDE */
   double *scale;   /* [inside] */
+  double *cost;    /* [variables - 2 inside] of giving way */
   double *linear, *lowest, *x, *bound;
   size_t *h_starts, *c_starts;
   uint32_t *h_indices, *c_indices;
@@ -32,8 +34,9 @@ typedef struct work {
 } work;
 
 static void work_free(work *w) {
-  void *const blocks[] = {w->c_values, w->h_values, w->c_indices, w->h_indices, w->c_starts, w->h_starts, w->bound,
-                          w->x,        w->lowest,   w->linear,    w->scale,     w->slack,    w->whole,    w->local};
+  void *const blocks[] = {w->c_values, w->h_values, w->c_indices, w->h_indices, w->c_starts,
+                          w->h_starts, w->bound,    w->x,         w->lowest,    w->linear,
+                          w->scale,    w->cost,     w->slack,     w->whole,     w->local};
   for (size_t k = 0; k < sizeof blocks / sizeof *blocks; k++) batten_free(w->ctx, blocks[k]);
 }
 
@@ -71,12 +74,15 @@ static batten_status choose_unknowns(work *w) {
 /* A variable for each group that has rows. */
 static batten_status choose_slacks(work *w) {
   w->slack = batten_alloc_array(w->ctx, w->groups, sizeof *w->slack);
-  if (!w->slack) return BATTEN_E_NOMEM;
+  w->cost = batten_alloc_array(w->ctx, w->groups, sizeof *w->cost);
+  if (!w->slack || !w->cost) return BATTEN_E_NOMEM;
   for (size_t k = 0; k < w->groups; k++) w->slack[k] = OUTSIDE;
   w->variables = 2 * w->inside;
   for (size_t i = 0; i < w->rows->rows; i++) {
     size_t k = w->rows->group[i];
-    if (w->slack[k] == OUTSIDE) w->slack[k] = (uint32_t)w->variables++;
+    if (w->slack[k] != OUTSIDE) continue;
+    w->cost[w->variables - 2 * w->inside] = w->p->weight * w->costs[k];
+    w->slack[k] = (uint32_t)w->variables++;
   }
   return BATTEN_OK;
 }
@@ -110,7 +116,7 @@ static batten_status make_hessian(work *w) {
   for (size_t row = 2 * w->inside; row < n; row++) {
     w->h_starts[row] = at;
     w->h_indices[at] = (uint32_t)row;
-    w->h_values[at++] = w->p->weight;
+    w->h_values[at++] = w->cost[row - 2 * w->inside];
   }
   w->h_starts[n] = at;
   return BATTEN_OK;
@@ -130,7 +136,7 @@ static batten_status make_rows(work *w) {
     return BATTEN_E_NOMEM;
   for (size_t k = 0; k < n; k++) {
     bool slack = k >= 2 * w->inside;
-    w->linear[k] = slack ? w->p->weight : 0;
+    w->linear[k] = slack ? w->cost[k - 2 * w->inside] : 0;
     w->lowest[k] = slack ? 0 : -INFINITY;
   }
   for (size_t i = 0; i < r->rows; i++) {
@@ -174,8 +180,8 @@ static batten_status solve(work *w, size_t *iterations) {
 }
 
 batten_status loft_program_solve(batten_context *ctx, loft_program *p, const loft_rows *rows, size_t groups,
-                                 double *y, double *give) {
-  work w = {.ctx = ctx, .p = p, .rows = rows, .unknowns = p->hessian.rows, .groups = groups};
+                                 const double *costs, double *y, double *give) {
+  work w = {.ctx = ctx, .p = p, .rows = rows, .unknowns = p->hessian.rows, .groups = groups, .costs = costs};
   batten_status st = choose_unknowns(&w), accuracy = BATTEN_OK;
   if (st >= 0) st = choose_slacks(&w);
   if (st >= 0 && w.variables >= OUTSIDE)

@@ -19,12 +19,19 @@ static const size_t NOBODY = SIZE_MAX;
 
 /* A round that lowers the objective by less than this part is the last one. */
 static const double GAIN = 1e-3;
-/* One that leaves more than this part of what fails is, too, when pieces are as short as they may be. */
+/* One that leaves more than this part of what fails is, too, when giving way costs most. */
 static const double PROGRESS = 0.5;
-/* A turn in radians costs as much as this many contours' legs that miss wholly; far above multipliers. */
-static const double WEIGHT = 1e3;
-/* Inequalities that a reference satisfies by less than this many radians are in the program from the beginning. */
-static const double NEAR = 1e-3;
+/* What a turn that gives way by a radian costs, times the length of its legs, as the objective weighs them. Too much
+ * would spoil the turns around it, and the surface with them; too little would leave it where there is a solution: so
+ * more from round to round. */
+static const double WEIGHT = 100, HEAVIER = 10, HEAVIEST = 1e5;
+/* Bisections without a feasible reference, at most: shorter pieces help only those who know where they lead. */
+static const unsigned LEAST_MAX = 2;
+/* Inequalities are hardly satisfied by less than this part of the contours' turn; where others are violated on the
+ * same piece by less than the larger one. */
+static const double NEAR = 0.02, AROUND = 0.2;
+/* Without a feasible reference, programs of a round: what they leave is left to the next one. */
+enum { PASSES = 4 };
 static const unsigned REACH = 2;
 
 typedef struct span {
@@ -42,6 +49,7 @@ typedef struct work {
   size_t *group;      /* [vertices] or NOBODY: never in a program */
   size_t *who;        /* [groups] vertices */
   double *give;       /* [group_room] */
+  double *costs;      /* [group_room] of giving way, without the weight */
   span *now, *before; /* [vertices] pieces */
   loft_pieces pieces, older;
   loft_directions *directions; /* [slabs] of the reference, made when asked for */
@@ -67,8 +75,8 @@ static void work_free(work *w) {
   loft_pieces_free(w->ctx, &w->older);
   loft_pieces_free(w->ctx, &w->pieces);
   batten_qp_workspace_free(w->program.workspace);
-  void *const blocks[] = {w->free_control, w->reference, w->control, w->best, w->y,     w->directions,
-                          w->before,       w->now,       w->give,    w->who,  w->group, w->start};
+  void *const blocks[] = {w->free_control, w->reference, w->control, w->best, w->y,     w->directions, w->before,
+                          w->now,          w->give,      w->costs,   w->who,  w->group, w->start};
   for (size_t k = 0; k < sizeof blocks / sizeof *blocks; k++) batten_free(w->ctx, blocks[k]);
 }
 
@@ -132,9 +140,14 @@ static batten_status enroll(work *w, size_t k) {
     if (who) w->who = who;
     void *give = who ? batten_realloc_array(w->ctx, w->give, room, sizeof *w->give) : NULL;
     if (give) w->give = give;
-    if (!give) return BATTEN_E_NOMEM;
+    void *costs = give ? batten_realloc_array(w->ctx, w->costs, room, sizeof *w->costs) : NULL;
+    if (costs) w->costs = costs;
+    if (!costs) return BATTEN_E_NOMEM;
     w->group_room = room;
   }
+  size_t i = slab_of(w, k), v = k - w->start[i], legs = loft_legs(&w->net->slabs[i].space), next = (v + 1) % legs;
+  double *const *length = w->net->slabs[i].length;
+  w->costs[w->groups] = (length[0][v] + length[1][v] + length[0][next] + length[1][next]) / 4;
   w->give[w->groups] = 0;
   w->who[w->groups] = k;
   w->group[k] = w->groups++;
@@ -148,8 +161,7 @@ static batten_status separate(work *w, size_t k) {
   bool strict;
   batten_status st = BATTEN_OK;
   if (!d->turned) st = loft_directions_make(w->ctx, w->net, w->reference, i, w->opt->margin, w->opt->depth_max, d);
-  unsigned least = w->feasible || w->least > w->opt->depth_max ? w->opt->depth_max : w->least;
-  if (w->feasible) least = 0;
+  unsigned least = w->feasible ? 0 : w->least < w->opt->depth_max ? w->least : w->opt->depth_max;
   if (st >= 0)
     st = loft_pieces_add(w->ctx, w->net, w->reference, d, k - w->start[i], w->opt->margin, least, w->group[k],
                          &w->pieces, &strict);
@@ -168,14 +180,16 @@ static batten_status separate(work *w, size_t k) {
   return BATTEN_OK;
 }
 
-/* Inequalities of vertex k that `control` satisfies by less than near. */
-static batten_status take_rows(work *w, const double *control, size_t k, double near) {
+/* Inequalities of vertex k that `control` violates more than its vertex gives way, and with them those that it hardly
+ * satisfies; or all that it hardly satisfies. */
+static batten_status take_rows(work *w, const double *control, size_t k, bool violated) {
   batten_status st = BATTEN_OK;
-  double least = INFINITY;
+  double give = w->give[w->group[k]];
   for (size_t j = 0; j < w->now[k].count && st >= 0; j++) {
     loft_piece *piece = &w->pieces.all[w->now[k].first + j];
-    double wanted = near >= 0 ? near : -w->give[w->group[k]] - piece->inside / 2;
-    st = loft_rows_add(w->ctx, w->net, control, piece, wanted, &w->rows, &least);
+    double near = (violated ? AROUND : NEAR) * piece->turn - give,
+           below = violated ? -give - piece->inside / 2 : near;
+    st = loft_rows_add(w->ctx, w->net, control, piece, below, near, &w->rows);
   }
   return st;
 }
@@ -200,8 +214,8 @@ static batten_status begin_round(work *w) {
     size_t k = w->who[g];
     w->give[g] = 0;
     st = separate(w, k);
-    if (st >= 0) st = take_rows(w, w->free_control, k, 0);
-    if (st >= 0) st = take_rows(w, w->reference, k, NEAR);
+    if (st >= 0) st = take_rows(w, w->free_control, k, true);
+    if (st >= 0) st = take_rows(w, w->reference, k, false);
   }
   w->seconds_rows += batten_now() - start;
   return st;
@@ -217,7 +231,7 @@ static batten_status extend(work *w, bool *more) {
       if (w->group[k] == NOBODY) st = enroll(w, k);
       if (st >= 0) st = separate(w, k);
     }
-  for (size_t g = 0; g < w->groups && st >= 0; g++) st = take_rows(w, w->control, w->who[g], -1);
+  for (size_t g = 0; g < w->groups && st >= 0; g++) st = take_rows(w, w->control, w->who[g], true);
   *more = w->rows.rows > rows;
   w->seconds_rows += batten_now() - start;
   return st;
@@ -227,9 +241,9 @@ static batten_status solve_round(work *w) {
   batten_status st = begin_round(w);
   bool more = st >= 0 && w->rows.rows > 0;
   if (st >= 0 && !more) st = extend(w, &more);
-  while (st >= 0 && more) {
+  for (unsigned pass = 0; st >= 0 && more && (w->feasible || pass < PASSES); pass++) {
     double start = batten_now();
-    st = loft_program_solve(w->ctx, &w->program, &w->rows, w->groups, w->y, w->give);
+    st = loft_program_solve(w->ctx, &w->program, &w->rows, w->groups, w->costs, w->y, w->give);
     w->seconds_qp += batten_now() - start;
     if (st < 0) break;
     loft_net_expand(w->net, w->y, w->control);
@@ -238,13 +252,10 @@ static batten_status solve_round(work *w) {
   return st;
 }
 
-/* Of all vertices; NaN counts as infinite. */
-static double whole_shortage(const work *w, const double *control, bool only_groups) {
+/* Of all vertices together. */
+static double whole_shortage(const work *w, const double *control) {
   double sum = 0;
-  if (only_groups)
-    for (size_t g = 0; g < w->groups; g++) sum += shortage_of(w, control, w->who[g]);
-  else
-    for (size_t k = 0; k < w->vertices; k++) sum += shortage_of(w, control, k);
+  for (size_t k = 0; k < w->vertices; k++) sum += shortage_of(w, control, k);
   return sum;
 }
 
@@ -263,21 +274,23 @@ static void take(work *w, double objective, double shortage) {
   w->result.rows_used = w->rows.rows;
 }
 
-/* Judges the round's answer; whether another one is worth while. */
+/* Judges the round's answer; whether another one is worth while. Its reference is the best surface. */
 static bool judge(work *w) {
-  double objective = loft_objective_value(w->objective, w->y), shortage = whole_shortage(w, w->control, true);
-  bool feasible = shortage == 0;
-  if (w->feasible) {
-    if (!feasible || !(objective < w->objective_best)) return false;
-    bool gains = objective < (1 - GAIN) * w->objective_best;
-    take(w, objective, 0);
-    return gains;
+  double objective = loft_objective_value(w->objective, w->y), shortage = whole_shortage(w, w->control);
+  bool feasible = shortage == 0, last = w->program.weight >= HEAVIEST, gains = !last;
+  if (!feasible && !last) w->program.weight *= HEAVIER;
+  if (w->least < LEAST_MAX) w->least++;
+  if (feasible ? !w->feasible || objective < w->objective_best : !w->feasible && shortage < w->shortage_best) {
+    if (feasible)
+      gains = !w->feasible || objective < (1 - GAIN) * w->objective_best;
+    else if (last)
+      gains = shortage < PROGRESS * w->shortage_best;
+    take(w, objective, shortage);
+    w->feasible = feasible;
+  } else {
+    gains = gains && !feasible;
+    loft_net_expand(w->net, w->best, w->control);
   }
-  bool deepest = w->least >= w->opt->depth_max;
-  bool gains = feasible || !deepest || shortage < PROGRESS * w->shortage_best;
-  if (feasible || shortage < w->shortage_best) take(w, objective, shortage);
-  w->feasible = feasible;
-  w->least++;
   return gains;
 }
 
@@ -290,15 +303,17 @@ static int compare_elastic(const void *a, const void *b) {
 
 static batten_status name_elastic(work *w) {
   loft_result *r = &w->result;
+  size_t count = 0;
   loft_net_expand(w->net, w->best, w->control);
-  r->elastic = batten_alloc_array(w->ctx, w->groups, sizeof *r->elastic);
+  for (size_t k = 0; k < w->vertices; k++) count += shortage_of(w, w->control, k) > 0;
+  r->elastic = batten_alloc_array(w->ctx, count, sizeof *r->elastic);
   if (!r->elastic) return BATTEN_E_NOMEM;
-  for (size_t g = 0; g < w->groups; g++) {
-    size_t k = w->who[g], i = slab_of(w, k);
+  for (size_t k = 0; k < w->vertices && r->elastic_count < count; k++) {
+    size_t i = slab_of(w, k);
     double amount = shortage_of(w, w->control, k);
     if (amount > 0) r->elastic[r->elastic_count++] = (loft_elastic){i, k - w->start[i], amount};
   }
-  if (r->elastic_count > 0) qsort(r->elastic, r->elastic_count, sizeof *r->elastic, compare_elastic);
+  if (count > 0) qsort(r->elastic, count, sizeof *r->elastic, compare_elastic);
   return BATTEN_OK;
 }
 
@@ -315,7 +330,7 @@ batten_status loft_rounds(batten_context *ctx, const loft_net *net, loft_objecti
   batten_status st = work_start(&w);
   if (st < 0) goto done;
   w.rows.columns = 2 * net->z.columns;
-  double start = batten_now(), shortage = whole_shortage(&w, w.control, false);
+  double start = batten_now(), shortage = whole_shortage(&w, w.control);
   w.seconds_rows += batten_now() - start;
   take(&w, loft_objective_value(objective, free), shortage);
   w.feasible = shortage == 0;

@@ -211,12 +211,11 @@ static bool given(const loft_piece *piece, unsigned n, unsigned r) {
   return (r == 0 && piece->from == 0) || (r == n + LOFT_FIELD && piece->to == 1);
 }
 
-static double least_value(const loft_net *net, const double *control, const loft_piece *piece) {
-  double values[SIDES][PRODUCTS], least = INFINITY;
-  piece_values(net, control, piece, values);
+static double smallest(unsigned n, const loft_piece *piece, double (*values)[PRODUCTS]) {
+  double least = INFINITY;
   for (unsigned side = 0; side < SIDES; side++)
-    for (unsigned r = 0; r <= net->degree + LOFT_FIELD; r++)
-      if (!given(piece, net->degree, r)) least = fmin(least, values[side][r]);
+    for (unsigned r = 0; r <= n + LOFT_FIELD; r++)
+      if (!given(piece, n, r)) least = fmin(least, values[side][r]);
   return least;
 }
 
@@ -249,7 +248,8 @@ batten_status loft_pieces_add(batten_context *ctx, const loft_net *net, const do
   if (!loft_bound_of(slab, v, margin, &bound)) return BATTEN_OK;
   piece.bound = better(slab, v, &bound);
   double smaller = fmin(fabs(loft_turn(slab, 0, v)), fabs(loft_turn(slab, 1, v)));
-  piece.inside = slab->wanted[v] == LOFT_FREE ? INSIDE : fmin(INSIDE, smaller / 100);
+  piece.turn = slab->wanted[v] == LOFT_FREE ? 1 : smaller;
+  piece.inside = fmin(INSIDE, piece.turn / 100);
   bool bisect = loft_shortage(net, control, d->slab, v, &bound) == 0;
   unsigned depth = 0;
   size_t index = 0;
@@ -257,7 +257,9 @@ batten_status loft_pieces_add(batten_context *ctx, const loft_net *net, const do
     piece.from = ldexp((double)index, -(int)depth);
     piece.to = ldexp((double)index + 1, -(int)depth);
     separator(net, d, v, depth, index, piece.w);
-    bool holds = least_value(net, control, &piece) >= 0;
+    double values[SIDES][PRODUCTS];
+    piece_values(net, control, &piece, values);
+    bool holds = smallest(net->degree, &piece, values) >= 0;
     if (depth < d->depth && (depth < least || (bisect && !holds))) {
       depth++;
       index *= 2;
@@ -413,13 +415,14 @@ static batten_status add_row(batten_context *ctx, unsigned n, const leg_table *t
 }
 
 batten_status loft_rows_add(batten_context *ctx, const loft_net *net, const double *control, loft_piece *piece,
-                            double near, loft_rows *rows, double *least) {
+                            double below, double near, loft_rows *rows) {
   const loft_slab *slab = &net->slabs[piece->slab];
   unsigned n = net->degree;
   size_t legs = loft_legs(&slab->space);
   double values[SIDES][PRODUCTS];
   batten_status st = BATTEN_OK;
   piece_values(net, control, piece, values);
+  if (!(smallest(n, piece, values) < below)) return BATTEN_OK;
   for (unsigned half = 0; half < 2 && st >= 0; half++) {
     size_t v = piece->vertex + half < legs ? piece->vertex + half : 0;
     leg_table table = {.count = 0};
@@ -428,9 +431,7 @@ batten_status loft_rows_add(batten_context *ctx, const loft_net *net, const doub
       turned_field(piece, side, leg_length(slab, v), u);
       for (unsigned r = 0; r <= n + LOFT_FIELD && st >= 0; r++) {
         uint64_t bit = (uint64_t)1 << (side * (n + LOFT_FIELD + 1) + r);
-        if (given(piece, n, r)) continue;
-        *least = fmin(*least, values[side][r]);
-        if (!(values[side][r] < near) || (piece->used & bit)) continue;
+        if (given(piece, n, r) || !(values[side][r] < near) || (piece->used & bit)) continue;
         if (!table.columns) st = leg_table_make(ctx, net, piece->slab, v, &table);
         if (st < 0) break;
         coefficient(n, piece, u, r, g);
