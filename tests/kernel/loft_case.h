@@ -28,44 +28,52 @@ static inline void loft_case_free(loft_case *c) {
   memset(c, 0, sizeof *c);
 }
 
-/* Contours times a power of two. */
+static inline void loft_case_scale(batten_context *ctx, batten_curve **curve, double scale) {
+  if (!*curve || scale == 1) return;
+  batten_curve_form form = batten_curve_get(*curve);
+  size_t count = form.knot_count - form.degree - 1;
+  double *points = loft_scene_memory(2 * count, sizeof *points);
+  for (size_t j = 0; j < 2 * count; j++) points[j] = scale * form.control_points[j];
+  form.control_points = points;
+  batten_curve *larger = NULL;
+  if (batten_curve_create(ctx, &form, &larger) < 0) abort();
+  batten_curve_free(*curve);
+  *curve = larger;
+  free(points);
+}
+
+/* Contours times a power of two. The scene has a context of its own: memory that fails is the case's. */
 static inline batten_status loft_case_stack(loft_case *c, const loft_rule *rule, double scale) {
-  loft_scene scene = loft_scene_make(c->ctx, rule);
-  for (unsigned e = 0; e < 2; e++) c->opt.slopes[e] = scene.slopes[e];
-  for (size_t i = 0; i < scene.count && scale != 1; i++) {
-    batten_curve_form form = batten_curve_get(scene.contours[i]);
-    size_t count = form.knot_count - form.degree - 1;
-    double *points = loft_scene_memory(2 * count, sizeof *points);
-    for (size_t j = 0; j < 2 * count; j++) points[j] = scale * form.control_points[j];
-    form.control_points = points;
-    batten_curve_free(scene.contours[i]);
-    if (batten_curve_create(c->ctx, &form, &scene.contours[i]) < 0) abort();
-    free(points);
+  batten_context *ctx = t_context(NULL, NULL, 1);
+  loft_scene scene = loft_scene_make(ctx, rule);
+  for (size_t i = 0; i < scene.count; i++) loft_case_scale(ctx, &scene.contours[i], scale);
+  for (unsigned e = 0; e < 2; e++) {
+    loft_case_scale(ctx, &scene.slopes[e], scale);
+    c->opt.slopes[e] = scene.slopes[e];
   }
   batten_status st = loft_stack_make(c->ctx, scene.count, (const batten_curve *const *)scene.contours, scene.heights,
                                      &c->opt, &c->stack);
   if (st >= 0) st = loft_shape_prepare(c->ctx, &c->stack, &c->opt);
-  loft_scene_free(&scene);
   for (unsigned e = 0; e < 2; e++) c->opt.slopes[e] = NULL;
+  loft_scene_free(&scene);
+  batten_context_free(ctx);
   return st;
 }
 
+/* degree 0: as usual. The objective keeps pointers into the case: it stays where it is. */
 static inline batten_status loft_case_make(batten_context *ctx, const loft_rule *rule, unsigned degree, double scale,
-                                           const batten_loft_options *opt, loft_case *out) {
-  loft_case c = {.ctx = ctx, .opt = opt ? *opt : batten_loft_options_default()};
-  batten_status st = loft_case_stack(&c, rule, scale);
-  if (st >= 0) st = loft_slabs_make(ctx, &c.stack, &c.slabs);
-  if (st >= 0) c.slab_count = c.stack.count - 1;
-  for (size_t i = 0; i < c.slab_count && st >= 0; i++) st = loft_vertices_make(ctx, &c.stack, i, &c.slabs[i]);
-  if (!degree) degree = 2 * c.stack.smoothness + 2;
-  if (st >= 0) st = loft_net_make(ctx, &c.stack, c.slabs, degree, &c.net);
-  if (st >= 0) st = loft_objective_new(ctx, &c.stack, &c.net, &c.opt, &c.objective);
-  if (st >= 0 && !(c.free = batten_alloc_array(ctx, c.net.z.columns, 2 * sizeof *c.free))) st = BATTEN_E_NOMEM;
-  if (st >= 0) st = loft_objective_minimum(ctx, c.objective, c.free);
-  if (st < 0)
-    loft_case_free(&c);
-  else
-    *out = c;
+                                           const batten_loft_options *opt, loft_case *c) {
+  *c = (loft_case){.ctx = ctx, .opt = opt ? *opt : batten_loft_options_default()};
+  batten_status st = loft_case_stack(c, rule, scale);
+  if (st >= 0) st = loft_slabs_make(ctx, &c->stack, &c->slabs);
+  if (st >= 0) c->slab_count = c->stack.count - 1;
+  for (size_t i = 0; i < c->slab_count && st >= 0; i++) st = loft_vertices_make(ctx, &c->stack, i, &c->slabs[i]);
+  if (!degree) degree = 2 * c->stack.smoothness + 2;
+  if (st >= 0) st = loft_net_make(ctx, &c->stack, c->slabs, degree, &c->net);
+  if (st >= 0) st = loft_objective_new(ctx, &c->stack, &c->net, &c->opt, &c->objective);
+  if (st >= 0 && !(c->free = batten_alloc_array(ctx, c->net.z.columns, 2 * sizeof *c->free))) st = BATTEN_E_NOMEM;
+  if (st >= 0) st = loft_objective_minimum(ctx, c->objective, c->free);
+  if (st < 0) loft_case_free(c);
   return st;
 }
 
