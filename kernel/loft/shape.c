@@ -146,7 +146,29 @@ static batten_status tell_all(batten_context *ctx, loft_stack *s, size_t i, cons
   return st;
 }
 
+/* The first place at which a contour crosses itself: the loft does, too, which is for the caller to judge. */
+static batten_status tell_crossing(batten_context *ctx, loft_stack *s, size_t i, const batten_curve *curve) {
+  size_t count = 0;
+  double(*crossings)[2] = NULL;
+  batten_status st = batten_curve_crossings(ctx, curve, &count, &crossings);
+  if (st >= 0 && count > 0) {
+    s->self_crossing++;
+    st = tell(ctx, s, BATTEN_LOFT_SELF_CROSSING, i, i, crossings[0][0]);
+  }
+  batten_free(ctx, crossings);
+  return st;
+}
+
 /* ---- all together -------------------------------------------------------------------------------- */
+
+static batten_status look_at(batten_context *ctx, loft_stack *s, size_t i, shape_places *out) {
+  batten_curve *curve = NULL;
+  batten_status st = shape_curve(ctx, s->contours + i, &curve);
+  if (st >= 0) st = shape_places_find(ctx, s->contours + i, curve, out);
+  if (st >= 0) st = tell_crossing(ctx, s, i, curve);
+  batten_curve_free(curve);
+  return st;
+}
 
 static void mark_flat(loft_contour *c, const shape_places *places) {
   for (size_t k = 0; k < places->count; k++) {
@@ -168,7 +190,7 @@ static batten_status prepare(batten_context *ctx, loft_stack *s, double zone, sh
   batten_status st = BATTEN_OK;
   for (size_t i = 0; i < s->count && st >= 0; i++) {
     st = progress(ctx, 0, i, s->count);
-    if (st >= 0) st = shape_places_find(ctx, s->contours + i, places + i);
+    if (st >= 0) st = look_at(ctx, s, i, places + i);
   }
   for (size_t i = 1; i < s->count && st >= 0; i++) join(s->contours + i, places + i, places + i - 1);
   for (size_t i = s->count - 1; i-- > 0 && st >= 0;) join(s->contours + i, places + i, places + i + 1);

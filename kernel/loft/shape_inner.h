@@ -27,8 +27,11 @@ typedef struct shape_places {
   shape_place *at;
 } shape_places;
 
-/* Fails: NOMEM, TOO_LARGE. */
-batten_status shape_places_find(batten_context *ctx, const loft_contour *c, shape_places *out);
+/* The contour as a curve over [0, 1]. Fails: NOMEM, TOO_LARGE. */
+batten_status shape_curve(batten_context *ctx, const loft_contour *c, batten_curve **out);
+/* Fails: NOMEM. */
+batten_status shape_places_find(batten_context *ctx, const loft_contour *c, const batten_curve *curve,
+                                shape_places *out);
 
 /* Knots to be inserted, ascending. */
 typedef struct shape_knots {

@@ -176,8 +176,7 @@ static void find_signs(const loft_contour *c, shape_places *list) {
   }
 }
 
-/* The contour as a curve, for its inflections. */
-static batten_status make_curve(batten_context *ctx, const loft_contour *c, batten_curve **out) {
+batten_status shape_curve(batten_context *ctx, const loft_contour *c, batten_curve **out) {
   size_t count = 0;
   double *knots = NULL, *points = NULL;
   loft_matrix m = {0};
@@ -196,12 +195,11 @@ done:
   return st;
 }
 
-batten_status shape_places_find(batten_context *ctx, const loft_contour *c, shape_places *out) {
-  batten_curve *curve = NULL;
+batten_status shape_places_find(batten_context *ctx, const loft_contour *c, const batten_curve *curve,
+                                shape_places *out) {
   size_t count = 0;
   double *inflections = NULL;
-  batten_status st = make_curve(ctx, c, &curve);
-  if (st >= 0) st = batten_curve_inflections(ctx, curve, &count, &inflections);
+  batten_status st = batten_curve_inflections(ctx, curve, &count, &inflections);
   for (size_t k = 0; k < count && st >= 0; k++) {
     const shape_place p = classify(c, shape_wrap(&c->space, inflections[k]));
     st = add(ctx, out, &p);
@@ -209,6 +207,5 @@ batten_status shape_places_find(batten_context *ctx, const loft_contour *c, shap
   if (st >= 0) st = add_flat(ctx, c, out);
   if (st >= 0) find_signs(c, out);
   batten_free(ctx, inflections);
-  batten_curve_free(curve);
   return st;
 }

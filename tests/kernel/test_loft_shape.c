@@ -190,10 +190,245 @@ static void test_wild(batten_context *ctx) {
   T_RATIO((double)all.inserted, 20 * (double)inflections, "knots inserted, by inflections");
 }
 
+/* A cubic over [0, 1] with simple knots, x'' = 0 at the break number `flat` (0: nowhere) where its legs change from
+ * left bends to right ones; the second flat point there, `again`, bends back. */
+static batten_curve *make_s(batten_context *ctx, const double *breaks, size_t spans, size_t flat) {
+  double knots[32], points[64], angle = 0.1;
+  size_t count = 0;
+  for (int k = 0; k < 3; k++) knots[count++] = 0;
+  for (size_t k = 0; k <= spans; k++) knots[count++] = breaks[k];
+  for (int k = 0; k < 3; k++) knots[count++] = 1;
+  points[0] = points[1] = 0;
+  for (size_t v = 0; v + 5 < count; v++) { /* vertex v is x'' at break v, between legs v and v + 1 */
+    double length = knots[v + 4] - knots[v + 1];
+    points[2 * v + 2] = points[2 * v] + length * cos(angle);
+    points[2 * v + 3] = points[2 * v + 1] + length * sin(angle);
+    if (flat == 0 || v != flat) angle += flat == 0 || v < flat ? 0.3 : -0.3;
+  }
+  batten_curve *out = NULL;
+  if (batten_curve_create(ctx, &(batten_curve_form){3, count, knots, points, 0}, &out) < 0) abort();
+  return out;
+}
+
+/* Matched, at other places, and missing: by hand. */
+static void test_partners(batten_context *ctx) {
+  const double breaks[] = {0, 0.2, 0.4, 0.6, 0.8, 1}, heights[3] = {0, 1, 3};
+  const batten_loft_options opt = batten_loft_options_default();
+  loft_stack s = {0};
+  batten_curve *curves[3];
+  for (size_t i = 0; i < 3; i++) curves[i] = make_s(ctx, breaks, 5, 2);
+  T_OK(prepare(ctx, 3, curves, heights, &opt, &s), ctx);
+  bool flat = true;
+  for (size_t i = 0; i < 3; i++)
+    for (size_t b = 0; b <= s.contours[i].space.spans; b++)
+      flat = flat && s.contours[i].flat_above[b] == (i < 2 && b == 2);
+  T_CHECK(s.inflections == 3 && s.unmatched == 0 && s.note_count == 0 && s.knots_inserted == 0 && flat,
+          "matched inflections are flat, nothing is told and nothing inserted");
+  loft_stack_free(ctx, &s);
+
+  batten_curve_free(curves[2]);
+  curves[2] = make_s(ctx, breaks, 5, 3);
+  T_OK(prepare(ctx, 3, curves, heights, &opt, &s), ctx);
+  const batten_loft_note *n = s.notes;
+  T_CHECK(s.inflections == 3 && s.unmatched == 2 && s.note_count == 2, "one that moved: 2 without partner");
+  T_CHECK(s.note_count == 2 && n[0].remark == BATTEN_LOFT_UNMATCHED && n[0].contour == 1 && n[0].other == 2 &&
+              n[0].t == breaks[2] && n[1].contour == 2 && n[1].other == 1 && n[1].t == breaks[3],
+          "both are named");
+  const loft_space *low = &s.contours[1].space, *high = &s.contours[2].space;
+  T_CHECK(s.contours[0].flat_above[2] && !s.contours[1].flat_above[2], "flat only towards the partner");
+  T_CHECK(low->spans == 6 && fabs(low->breaks[2] - 0.38) < 1e-15 && high->spans == 6 &&
+              fabs(high->breaks[4] - 0.62) < 1e-15,
+          "a knot where the zone ends, on the side where both bend alike");
+  loft_stack_free(ctx, &s);
+
+  batten_curve_free(curves[2]);
+  curves[2] = make_s(ctx, breaks, 5, 0);
+  T_OK(prepare(ctx, 3, curves, heights, &opt, &s), ctx);
+  T_CHECK(
+      s.inflections == 2 && s.unmatched == 1 && s.note_count == 1 && s.notes[0].contour == 1 && s.notes[0].other == 2,
+      "a neighbour without one");
+  loft_stack_free(ctx, &s);
+  for (size_t i = 0; i < 3; i++) batten_curve_free(curves[i]);
+}
+
+/* Inside a span of a cubic x'' passes through 0 where both ends bend against each other evenly: matched at one t. */
+static void test_inside(batten_context *ctx) {
+  const double knots[] = {0, 0, 0, 0, 1, 1, 1, 1}, points[] = {0, 0, 0.3, 0.4, 0.7, -0.4, 1, 0};
+  const double twisted[] = {0, 0, 0.2, 0.4, 0.7, -0.4, 1, 0.1}, heights[2] = {0, 1};
+  const batten_loft_options opt = batten_loft_options_default();
+  batten_curve *curves[2] = {NULL, NULL};
+  loft_stack s = {0};
+  for (size_t i = 0; i < 2; i++)
+    T_OK(batten_curve_create(ctx, &(batten_curve_form){3, 8, knots, points, 0}, &curves[i]), ctx);
+  T_OK(prepare(ctx, 2, curves, heights, &opt, &s), ctx);
+  size_t at = 0;
+  for (size_t b = 1; b < s.contours[0].space.spans; b++)
+    if (s.contours[0].flat_above[b]) at = b;
+  T_CHECK(s.unmatched == 0 && s.inflections == 2 && at > 0 && fabs(s.contours[0].space.breaks[at] - 0.5) < 1e-12,
+          "an inflection inside a span becomes a knot, flat");
+  bool same = false;
+  for (size_t b = 1; b < s.contours[1].space.spans; b++)
+    same = same || s.contours[1].space.breaks[b] == s.contours[0].space.breaks[at];
+  T_CHECK(same, "the same in both");
+  loft_stack_free(ctx, &s);
+  batten_curve_free(curves[1]);
+  T_OK(batten_curve_create(ctx, &(batten_curve_form){3, 8, knots, twisted, 0}, &curves[1]), ctx);
+  T_OK(prepare(ctx, 2, curves, heights, &opt, &s), ctx);
+  T_CHECK(has_note(&s, BATTEN_LOFT_NOT_FLAT, 1) && !has_note(&s, BATTEN_LOFT_NOT_FLAT, 0) && s.unmatched == 2,
+          "x'' is not 0 at that of a curve that is not even, it is told");
+  loft_stack_free(ctx, &s);
+  for (size_t i = 0; i < 2; i++) batten_curve_free(curves[i]);
+}
+
+/* The paper's contours, straight pieces, cylinders: nothing to be told. A hairpin needs knots. */
+static void test_kinds(batten_context *ctx) {
+  const batten_loft_options opt = batten_loft_options_default();
+  for (unsigned kind = LOFT_PAPER; kind < LOFT_KINDS; kind++)
+    for (unsigned degree = 2; degree <= (kind == LOFT_PAPER ? 2 : 5); degree++) {
+      loft_rule rule = {.kind = (loft_kind)kind,
+                        .degree = degree,
+                        .smoothness = degree > 2 ? 2 : 1,
+                        .contours = 4,
+                        .spans = 9,
+                        .seed = 4};
+      loft_scene scene = loft_scene_make(ctx, &rule);
+      loft_stack s = {0};
+      tally all = {0};
+      T_OK(prepare(ctx, scene.count, scene.contours, scene.heights, &opt, &s), ctx);
+      check_vertices(ctx, &s, scene.contours, &all);
+      /* Straight pieces end at other knots in each contour. */
+      size_t most = kind == LOFT_STRAIGHT ? 8 * (degree - 2) : 0;
+      T_CHECK(s.note_count == 0 && all.wrong == 0 && all.steep == 0 && s.knots_inserted <= most,
+              "kind %u, degree %u: nothing to tell, %zu knots inserted, %zu vertices", kind, degree, s.knots_inserted,
+              all.checked);
+      loft_stack_free(ctx, &s);
+      loft_scene_free(&scene);
+    }
+  const double knots[] = {0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1};
+  const double points[] = {-1, 0, 0, 0, 1, 0, 1, 0.1, 0, 0.1, -1, 0.1}, heights[2] = {0, 1};
+  batten_curve *curves[2] = {NULL, NULL};
+  for (size_t i = 0; i < 2; i++)
+    T_OK(batten_curve_create(ctx, &(batten_curve_form){5, 12, knots, points, 0}, &curves[i]), ctx);
+  loft_stack s = {0};
+  tally all = {0};
+  T_OK(prepare(ctx, 2, curves, heights, &opt, &s), ctx);
+  check_vertices(ctx, &s, curves, &all);
+  T_CHECK(s.note_count == 0 && all.checked > 0 && all.wrong == 0 && all.turn < 1 && s.knots_inserted > 0,
+          "a hairpin: %zu knots inserted, turns are %.3g of what is allowed", s.knots_inserted / 2, all.turn);
+  loft_stack_free(ctx, &s);
+  for (size_t i = 0; i < 2; i++) batten_curve_free(curves[i]);
+}
+
+/* A loop: one crossing is told, of the contour that has it. */
+static void test_loop(batten_context *ctx) {
+  const double knots[] = {0, 0, 0, 0, 0.5, 1, 1, 1, 1}, heights[2] = {0, 1};
+  const double arch[] = {-1, 0, -1, 1, 0, 2, 1, 1, 1, 0}, loop[] = {-1, 0, 2, 2, 0, 4, -2, 2, 1, 0};
+  const batten_loft_options opt = batten_loft_options_default();
+  batten_curve *curves[2] = {NULL, NULL};
+  T_OK(batten_curve_create(ctx, &(batten_curve_form){3, 9, knots, loop, 0}, &curves[0]), ctx);
+  T_OK(batten_curve_create(ctx, &(batten_curve_form){3, 9, knots, arch, 0}, &curves[1]), ctx);
+  batten_curve *reversed = NULL;
+  T_OK(batten_curve_reverse(ctx, curves[1], &reversed), ctx);
+  loft_stack s = {0};
+  T_OK(prepare(ctx, 2, (batten_curve *[]){curves[0], reversed}, heights, &opt, &s), ctx);
+  T_CHECK(s.self_crossing == 1 && has_note(&s, BATTEN_LOFT_SELF_CROSSING, 0) &&
+              !has_note(&s, BATTEN_LOFT_SELF_CROSSING, 1),
+          "a contour that crosses itself is told");
+  size_t count = 0;
+  double(*crossings)[2] = NULL;
+  T_OK(batten_curve_crossings(ctx, curves[0], &count, &crossings), ctx);
+  for (size_t k = 0; k < s.note_count; k++)
+    if (s.notes[k].remark == BATTEN_LOFT_SELF_CROSSING)
+      T_RATIO(count ? fabs(s.notes[k].t - crossings[0][0]) : 1, 1e-12, "where it does");
+  batten_free(ctx, crossings);
+  loft_stack_free(ctx, &s);
+  batten_curve_free(reversed);
+  for (size_t i = 0; i < 2; i++) batten_curve_free(curves[i]);
+}
+
+/* Turned, moved, 2^k times as large and high, mirrored: the same knots. */
+static void test_invariance(batten_context *ctx) {
+  loft_rule rule = {.kind = LOFT_STACK,
+                    .degree = 4,
+                    .smoothness = 2,
+                    .contours = 4,
+                    .inflections = 2,
+                    .unmatched = true,
+                    .seed = 12,
+                    .decades = 1,
+                    .rotation = 0.3};
+  const double matrices[3][4] = {{0x1p40, 0, 0, 0x1p40}, {-1, 0, 0, 1}, {0.6, -0.8, 0.8, 0.6}};
+  const batten_loft_options opt = batten_loft_options_default();
+  loft_stack first = {0};
+  for (size_t k = 0; k < 4; k++) {
+    loft_scene scene = loft_scene_make(ctx, &rule);
+    for (size_t i = 0; i < scene.count && k > 0; i++) {
+      batten_curve *moved = NULL;
+      if (batten_curve_transform(ctx, scene.contours[i], matrices[k - 1], NULL, NULL, &moved) < 0) abort();
+      batten_curve_free(scene.contours[i]);
+      scene.contours[i] = moved;
+      scene.heights[i] *= 0x1p-7;
+    }
+    loft_stack s = {0};
+    T_OK(prepare(ctx, scene.count, scene.contours, scene.heights, &opt, &s), ctx);
+    loft_scene_free(&scene);
+    if (k == 0) {
+      first = s;
+      continue;
+    }
+    bool same = s.note_count == first.note_count && s.knots_inserted == first.knots_inserted;
+    double off = 0;
+    for (size_t i = 0; i < s.count && same; i++) {
+      const loft_space *a = &s.contours[i].space, *b = &first.contours[i].space;
+      same = a->spans == b->spans && a->count == b->count &&
+             memcmp(s.contours[i].flat_above, first.contours[i].flat_above, a->spans + 1) == 0;
+      for (size_t j = 0; j <= a->spans && same; j++) off = fmax(off, fabs(a->breaks[j] - b->breaks[j]));
+    }
+    T_CHECK(same, "the same knots and notes");
+    T_RATIO(off, k == 1 ? 0 : 1e-12, "to");
+    loft_stack_free(ctx, &s);
+  }
+  T_CHECK(first.unmatched > 0, "with %zu inflections of %zu that have no partner", first.unmatched,
+          first.inflections);
+  loft_stack_free(ctx, &first);
+}
+
+static batten_status call(batten_context *ctx, void *arg) {
+  (void)arg;
+  batten_context *own = t_context(NULL, NULL, 1); /* scenes know no failure */
+  loft_rule rule = {.kind = LOFT_STACK,
+                    .degree = 3,
+                    .smoothness = 2,
+                    .contours = 3,
+                    .inflections = 2,
+                    .unmatched = true,
+                    .seed = 12,
+                    .decades = 2,
+                    .rotation = 0.3,
+                    .spans = 6,
+                    .slopes = true};
+  loft_scene scene = loft_scene_make(own, &rule);
+  batten_loft_options opt = batten_loft_options_default();
+  for (size_t e = 0; e < 2; e++) opt.slopes[e] = scene.slopes[e];
+  loft_stack s = {0};
+  batten_status st = prepare(ctx, scene.count, scene.contours, scene.heights, &opt, &s);
+  loft_stack_free(ctx, &s);
+  loft_scene_free(&scene);
+  batten_context_free(own);
+  return st;
+}
+
 int main(void) {
   batten_context *ctx = t_context(NULL, NULL, 1);
+  test_partners(ctx);
+  test_inside(ctx);
+  test_kinds(ctx);
+  test_loop(ctx);
+  test_invariance(ctx);
   test_random(ctx);
   test_wild(ctx);
+  t_fail_every_allocation("preparing", call, NULL);
+  t_cancel_every_progress("preparing", call, NULL);
   T_CHECK(batten_bytes_in_use(ctx) == 0, "nothing is left");
   batten_context_free(ctx);
   return t_done();
