@@ -3,8 +3,8 @@
  * surface.c    create, free, parts         evaluate.c   points, normals, curvatures
  * patches.c    span pairs as Bezier nets   tessellate.c meshes
  * closest.c    nearest places              measure.c    area, quantiles, tangent planes; extremes.c, box.c
- * certify*.c   the proofs of convexity, and of the signs of sections: include nothing of kernel/convex and not the blossoms of basis/bspline.c,
- * with which its inequalities are made
+ * certify*.c   the proofs of convexity and of the signs of sections: include nothing of kernel/convex, kernel/loft and
+ * not the blossoms of basis/bspline.c, with which their inequalities are made
  */
 #ifndef BATTEN_SURFACE_INNER_H
 #define BATTEN_SURFACE_INNER_H
