@@ -321,8 +321,8 @@ static batten_status plan_job(batten_context *ctx, job *j) {
   j->records = batten_alloc_array(ctx, j->pairs, sizeof *j->records);
   j->open = batten_alloc_array(ctx, j->pairs, sizeof *j->open);
   j->lanes = batten_alloc_array(ctx, LANES, sizeof *j->lanes);
+  if (j->lanes) memset(j->lanes, 0, LANES * sizeof *j->lanes);
   if (!j->records || !j->open || !j->lanes) return BATTEN_E_NOMEM;
-  memset(j->lanes, 0, LANES * sizeof *j->lanes);
   size_t lanes = tasks_of(j->pairs, PROVE); /* the more of both */
   for (size_t k = 0; k < lanes && k < LANES && st >= 0; k++)
     st = make_lane(ctx, j->plan, j->opt->depth_max, &j->lanes[k]);
