@@ -15,6 +15,8 @@
 #include "loft_inner.h"
 
 static const uint32_t OUTSIDE = UINT32_MAX;
+/* Beyond, active set engines take several times the interior point's time: many rows are nearly the same. */
+enum { DENSE = 200 };
 
 typedef struct work {
   batten_context *ctx;
@@ -167,6 +169,10 @@ static batten_status solve(work *w, size_t *iterations) {
   problem.lower = w->bound;
   problem.x_lower = w->lowest;
   batten_qp_options opt = batten_qp_options_default();
+  if (n > DENSE) {
+    opt.engine = BATTEN_QP_INTERIOR;
+    opt.hand_over = 0;
+  }
   batten_qp_solution solution = {.x = w->x};
   batten_qp_info info = {.iterations = 0};
   batten_status st = batten_qp_solve(w->ctx, &problem, &opt, w->p->workspace, &solution, &info);

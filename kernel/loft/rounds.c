@@ -20,7 +20,7 @@ static const size_t NOBODY = SIZE_MAX;
 /* A round that lowers the objective by less than this part is the last one. */
 static const double GAIN = 1e-3;
 /* One that leaves more than this part of what fails is, too, when giving way costs most. */
-static const double PROGRESS = 0.5;
+static const double PROGRESS = 0.9;
 /* What a turn that gives way by a radian costs, times the length of its legs, as the objective weighs them. Too much
  * would spoil the turns around it, and the surface with them; too little would leave it where there is a solution: so
  * more from round to round. */
@@ -31,7 +31,7 @@ static const unsigned LEAST_MAX = 2;
  * same piece by less than the larger one. */
 static const double NEAR = 0.02, AROUND = 0.2;
 /* Without a feasible reference, programs of a round: what they leave is left to the next one. */
-enum { PASSES = 4 };
+enum { PASSES = 12 };
 static const unsigned REACH = 2;
 
 typedef struct span {
