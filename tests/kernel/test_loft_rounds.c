@@ -100,7 +100,7 @@ static void test_stacks(void) {
 }
 
 /* More rounds never give a larger objective. */
-static void test_rounds(const loft_rule *rule) {
+static void test_rounds(const loft_rule *rule, unsigned degree) {
   batten_context *ctx = t_context(NULL, NULL, 1);
   double last = INFINITY, first = 0;
   bool falls = true;
@@ -110,7 +110,7 @@ static void test_rounds(const loft_rule *rule) {
     opt.rounds = rounds;
     loft_case c;
     answer a;
-    if (!solve(ctx, rule, 0, 1, &opt, &c, &a)) break;
+    if (!solve(ctx, rule, degree, 1, &opt, &c, &a)) break;
     if (a.result.feasible) {
       if (!feasible++) first = a.objective;
       falls = falls && a.objective <= last;
@@ -197,11 +197,12 @@ static batten_status whole(batten_context *ctx, void *arg) {
 }
 
 int main(void) {
-  loft_rule paper = {.kind = LOFT_PAPER}, many = loft_rule_random(28);
+  loft_rule paper = {.kind = LOFT_PAPER}, many = loft_rule_random(66);
   test_nothing_to_do();
   test_paper();
   test_stacks();
-  test_rounds(&many);
+  test_rounds(&many, 0);
+  test_rounds(&paper, 3);
   test_same_bits(&many);
   test_limit(&many);
   t_fail_every_allocation("rounds", whole, &paper);
