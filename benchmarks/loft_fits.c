@@ -1,8 +1,9 @@
 /* The scenes and batten's lofts for loft_peers.py, so that all surfaces go through the very same contours.
  *
  *   loft-fits scenes FOLDER                     writes NAME.scene; prints name and what it is
- *   loft-fits fit WAY SCENE SURFACE SECONDS     WAY: loft, or free (the minimum without inequalities, in the time of
- *                                               both); repeats for so many seconds
+ *   loft-fits fit WAY SCENE SURFACE SECONDS     WAY: loft (as by default), cubic (C^1 and of degree 3 across the
+ *                                               contours, raised where need be), free (the same without inequalities,
+ *                                               in the time of both); repeats for so many seconds
  *
  * Files as in loft_files.h. */
 #include <batten/loft.h>
@@ -41,10 +42,10 @@ static const scene_rule scene_rules[] = {
      {.degree = 5, .smoothness = 2, .contours = 8, .spans = 8, .decades = 1, .rotation = 0.4, .seed = 5}},
     {"stack-20-20",
      "Closed, convex, 20 contours of 20 spans",
-     {.degree = 3, .smoothness = 2, .closed = true, .contours = 20, .spans = 20, .rotation = 0.2, .seed = 6}},
+     {.degree = 3, .smoothness = 2, .closed = true, .contours = 20, .spans = 20, .rotation = 0.4, .seed = 6}},
     {"stack-50-40",
      "Closed, convex, 50 contours of 40 spans",
-     {.degree = 3, .smoothness = 2, .closed = true, .contours = 50, .spans = 40, .rotation = 0.2, .seed = 7}}};
+     {.degree = 3, .smoothness = 2, .closed = true, .contours = 50, .spans = 40, .rotation = 0.4, .seed = 7}}};
 
 static int write_scene(batten_context *ctx, const char *folder, const scene_rule *r) {
   loft_scene s = loft_scene_make(ctx, &r->rule);
@@ -111,13 +112,18 @@ static int fit(batten_context *ctx, const char *way, const char *scene, const ch
   batten_loft_info info = {0};
   size_t builds = 0;
   bool is_free = strcmp(way, "free") == 0, good = false;
+  batten_loft_options o = batten_loft_options_default();
+  if (strcmp(way, "loft") != 0) {
+    o.smoothness = 1;
+    o.degree = 3;
+  }
   batten_status st = make_contours(ctx, &s, curves, heights);
   while (st >= 0 && (builds == 0 || (builds < LOFT_REPEATS_MAX && batten_now() - begin < seconds))) {
     batten_loft_free(loft);
     batten_loft_free(unconstrained);
     loft = unconstrained = NULL;
     double start = batten_now();
-    st = batten_loft_build(ctx, s.count, (const batten_curve *const *)curves, heights, NULL, &loft,
+    st = batten_loft_build(ctx, s.count, (const batten_curve *const *)curves, heights, &o, &loft,
                            is_free ? &unconstrained : NULL, &info);
     times[builds++] = batten_now() - start;
   }
