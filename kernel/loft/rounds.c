@@ -27,12 +27,13 @@ static const double PROGRESS = 0.9;
 static const double WEIGHT = 100, HEAVIER = 10, HEAVIEST = 1e5;
 /* Bisections without a feasible reference, at most: shorter pieces help only those who know where they lead. */
 static const unsigned LEAST_MAX = 2;
-/* Inequalities are hardly satisfied by less than this part of the contours' turn; where others are violated on the
- * same piece by less than the larger one. */
-static const double NEAR = 0.02, AROUND = 0.2;
+/* Inequalities are hardly satisfied by less than this part of the contours' turn. */
+static const double NEAR = 0.02;
 /* Without a feasible reference, programs of a round: what they leave is left to the next one. */
 enum { PASSES = 12 };
-static const unsigned REACH = 2;
+/* Steps in the Hessian, each to the neighbouring contours and a degree of knots either way; more cost more than they
+ * lower the objective. */
+static const unsigned REACH = 1;
 
 typedef struct span {
   size_t first, count;
@@ -187,8 +188,7 @@ static batten_status take_rows(work *w, const double *control, size_t k, bool vi
   double give = w->give[w->group[k]];
   for (size_t j = 0; j < w->now[k].count && st >= 0; j++) {
     loft_piece *piece = &w->pieces.all[w->now[k].first + j];
-    double near = (violated ? AROUND : NEAR) * piece->turn - give,
-           below = violated ? -give - piece->inside / 2 : near;
+    double near = NEAR * piece->turn - give, below = violated ? -give - piece->inside / 2 : near;
     st = loft_rows_add(w->ctx, w->net, control, piece, below, near, &w->rows);
   }
   return st;
