@@ -16,6 +16,7 @@
  * rows.c         separators, and the inequalities that they give
  * program.c      the quadratic program, rigid or elastic
  * rounds.c       separators and programs in turns, finer inequalities
+ * settle.c       the turns themselves, by Newton's method, where programs leave vertices without a solution
  * measure.c      what the surface leaves of interpolation and continuity, from the patches alone
  *
  * loft.c         the handle: patches, whole surface, sections
@@ -319,6 +320,12 @@ batten_status loft_rounds(batten_context *ctx, const loft_net *net, loft_objecti
                           const batten_loft_options *opt, const double *free, double *seconds_rows,
                           double *seconds_qp, loft_result *out);
 void loft_result_free(batten_context *ctx, loft_result *r);
+
+/* From y, whose turns do not all hold, to a surface near the minimum of the objective in which they do; `free` the
+ * minimum without inequalities. *steps more by those of Newton's method. *feasible: all turns are proven to hold. Fails:
+ * NOMEM, TOO_LARGE, CANCELLED. */
+batten_status loft_settle(batten_context *ctx, const loft_net *net, const loft_objective *objective, double margin,
+                          const double *free, double *y, size_t *steps, bool *feasible);
 
 /* ---- the handle (loft.c, measure.c) -------------------------------------------------------------- */
 

@@ -15,11 +15,13 @@
 static const double TENSION = 1e-4, TENSION_POWER = 4;
 
 batten_loft_match_options batten_loft_match_options_default(void) {
-  return (batten_loft_match_options){.struct_size = sizeof(batten_loft_match_options),
-                                     .fit = batten_contour_options_default(),
-                                     .orient = 1,
-                                     .align = 1,
-                                     .features = 1};
+  batten_loft_match_options o = {
+      .struct_size = sizeof o, .fit = batten_contour_options_default(), .orient = 1, .align = 1, .features = 1};
+  /* Contours that hardly bend at some knots leave sections no room there. Every round takes a part of what the
+   * reference had. */
+  o.fit.margin = 0.2;
+  o.fit.rounds = 3;
+  return o;
 }
 
 enum { ATTEMPTS = 4 }; /* to meet a tolerance */

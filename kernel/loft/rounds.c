@@ -29,8 +29,9 @@ static const double WEIGHT = 100, HEAVIER = 10, HEAVIEST = 1e5;
 static const unsigned LEAST_MAX = 2;
 /* Inequalities are hardly satisfied by less than this part of the contours' turn. */
 static const double NEAR = 0.02;
-/* Without a feasible reference, programs of a round: what they leave is left to the next one. */
-enum { PASSES = 12 };
+/* Without a feasible reference: programs of a round, what they leave is left to the next one; rounds. Programs help
+ * where few vertices fail. What they leave, and where more fail, the turns themselves are taken, see settle.c. */
+enum { PASSES = 6, LOST = 3, CROWD = 100 };
 /* Steps in the Hessian, each to the neighbouring contours and a degree of knots either way; more cost more than they
  * lower the objective. */
 static const unsigned REACH = 1;
@@ -252,10 +253,16 @@ static batten_status solve_round(work *w) {
   return st;
 }
 
-/* Of all vertices together. */
-static double whole_shortage(const work *w, const double *control) {
+/* Of all vertices together; *count (may be NULL) of them fail. */
+static double whole_shortage(const work *w, const double *control, size_t *count) {
   double sum = 0;
-  for (size_t k = 0; k < w->vertices; k++) sum += shortage_of(w, control, k);
+  size_t failing = 0;
+  for (size_t k = 0; k < w->vertices; k++) {
+    double shortage = shortage_of(w, control, k);
+    sum += shortage;
+    failing += shortage > 0;
+  }
+  if (count) *count = failing;
   return sum;
 }
 
@@ -276,7 +283,7 @@ static void take(work *w, double objective, double shortage) {
 
 /* Judges the round's answer; whether another one is worth while. Its reference is the best surface. */
 static bool judge(work *w) {
-  double objective = loft_objective_value(w->objective, w->y), shortage = whole_shortage(w, w->control);
+  double objective = loft_objective_value(w->objective, w->y), shortage = whole_shortage(w, w->control, NULL);
   bool feasible = shortage == 0, last = w->program.weight >= HEAVIEST, gains = !last;
   if (!feasible && !last) w->program.weight *= HEAVIER;
   if (w->least < LEAST_MAX) w->least++;
@@ -292,6 +299,22 @@ static bool judge(work *w) {
     loft_net_expand(w->net, w->best, w->control);
   }
   return gains;
+}
+
+/* From the minimum without inequalities: nearer to the best surface than what programs gave way to. */
+static batten_status settle(work *w) {
+  double start = batten_now();
+  bool feasible = false;
+  memcpy(w->y, w->free, 2 * w->net->z.columns * sizeof *w->y);
+  batten_status st =
+      loft_settle(w->ctx, w->net, w->objective, w->opt->margin, w->free, w->y, &w->program.iterations, &feasible);
+  w->seconds_qp += batten_now() - start;
+  if (st < 0) return st;
+  loft_net_expand(w->net, w->y, w->control);
+  double shortage = whole_shortage(w, w->control, NULL);
+  if (shortage < w->shortage_best) take(w, loft_objective_value(w->objective, w->y), shortage);
+  w->feasible = feasible;
+  return BATTEN_OK;
 }
 
 static int compare_elastic(const void *a, const void *b) {
@@ -330,19 +353,21 @@ batten_status loft_rounds(batten_context *ctx, const loft_net *net, loft_objecti
   batten_status st = work_start(&w);
   if (st < 0) goto done;
   w.rows.columns = 2 * net->z.columns;
-  double start = batten_now(), shortage = whole_shortage(&w, w.control);
+  size_t failing;
+  double start = batten_now(), shortage = whole_shortage(&w, w.control, &failing);
   w.seconds_rows += batten_now() - start;
   take(&w, loft_objective_value(objective, free), shortage);
   w.feasible = shortage == 0;
-  bool more = !w.feasible;
-  for (unsigned round = 0; round < opt->rounds && more; round++) {
+  bool more = !w.feasible && failing <= CROWD;
+  for (unsigned round = 0; round < opt->rounds && more && (w.feasible || round < LOST); round++) {
     st = batten_progress(ctx, "quadratic program", (double)round / opt->rounds);
     if (st >= 0) st = solve_round(&w);
     if (st < 0) goto done;
     more = judge(&w);
     w.result.rounds = round + 1;
   }
-  st = name_elastic(&w);
+  if (!w.feasible) st = settle(&w);
+  if (st >= 0) st = name_elastic(&w);
   if (st < 0) goto done;
   w.result.feasible = w.feasible;
   w.result.iterations = w.program.iterations;

@@ -162,6 +162,7 @@ static bool section_has(lane *l, const double at[2][2], size_t box_limit, int co
 /* The sign of both end sections, or 0. */
 static signed char find_sign(lane *l, const double at[2][2], size_t box_limit) {
   const sections_sheet *w = &l->pair.w;
+  if (l->pair.lonely[0] || l->pair.lonely[1]) return 0;
   double sum = 0;
   for (size_t k = 0; k <= w->degree[0]; k++) sum += w->c[k * (w->degree[1] + 1)];
   signed char sign = sum < 0 ? -1 : 1;

@@ -56,6 +56,7 @@ typedef struct sections_pair {
   sections_sheet a, w; /* x_u, and w */
   double factor;       /* curvature = factor w / |a|^3, of the surface times unit; not above it */
   bool flat[2];        /* at s = 0, 1: both end sections have x_uu = 0 there to rounding of the control points */
+  bool lonely[2];      /* only one of them has */
   double allowed[2];   /* what that rounding leaves of w there */
 } sections_pair;
 

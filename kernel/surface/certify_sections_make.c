@@ -290,15 +290,15 @@ static void to_sheet(const strip *p, unsigned dim, sections_sheet *out) {
   memcpy(out->most, p->most, rows * sizeof *out->most);
 }
 
-/* Whether x_uu is 0 to the noise at the ends of its row k. */
-static bool is_flat(const strip *second, unsigned dim, unsigned k) {
+/* In how many of both end sections x_uu is 0 to the noise at row k. */
+static unsigned count_flat(const strip *second, unsigned dim, unsigned k) {
   size_t columns = second->width / dim;
   const double *row = second->row + k * second->width;
-  for (size_t x = 0; x < dim; x++) {
-    double most = fmax(fabs(row[x * columns]), fabs(row[(x + 1) * columns - 1]));
-    if (!(most <= second->noise[k] + second->error[k])) return false;
-  }
-  return true;
+  bool flat[2] = {true, true};
+  for (size_t x = 0; x < dim; x++)
+    for (size_t end = 0; end < 2; end++)
+      if (!(fabs(row[x * columns + end * (columns - 1)]) <= second->noise[k] + second->error[k])) flat[end] = false;
+  return (unsigned)flat[0] + (unsigned)flat[1];
 }
 
 /* What noise and rounding leave of n . (a x b), rows k of both. */
@@ -318,7 +318,9 @@ static void make_w(const sections_plan *plan, const strip *first, const strip *s
   multiply(plan, m, plan->own[0], plan->both[0], &turned, &b, room, &out->w);
   for (unsigned side = 0; side < 2; side++) {
     unsigned k = side ? m - 1 : 0;
-    out->flat[side] = m > 1 && is_flat(second, plan->dim, k);
+    unsigned flat = m > 1 ? count_flat(second, plan->dim, k) : 0;
+    out->flat[side] = flat == 2;
+    out->lonely[side] = flat == 1;
     out->allowed[side] = allowed_at(plan, first, second, k) + out->w.error[side ? 2 * m - 2 : 0];
   }
 }
@@ -352,6 +354,6 @@ void sections_pair_make(const sections_plan *plan, size_t mu, size_t nu, double 
   }
   out->w = (sections_sheet){.dim = 1, .degree = {0, 2 * plan->degree[1]}, .c = out->w.c};
   memset(out->w.c, 0, sections_count(&out->w) * sizeof *out->w.c);
-  out->flat[0] = out->flat[1] = false;
+  out->flat[0] = out->flat[1] = out->lonely[0] = out->lonely[1] = false;
   out->allowed[0] = out->allowed[1] = 0;
 }

@@ -159,8 +159,8 @@ typedef struct batten_sections_options {
   double normal[3];         /* of the planes, any length. Default (0, 0, 1). */
   const signed char *signs; /* [span pairs in u][in v] wanted: +1, -1; 0 nothing. NULL: where both end sections of a
                                span pair (at its least and its largest v) are proven to have one and the same sign on
-                               the closed span, but at ends where both have x_uu = 0, that sign; else nothing. Default
-                               NULL. */
+                               the closed span, but at ends where both have x_uu = 0 to rounding, that sign; else
+                               nothing, nor where only one of both has x_uu = 0 at an end. Default NULL. */
   unsigned depth_max;       /* bisections in each direction, 0 .. 30. Default 20. */
   size_t box_limit;         /* boxes at most for a span pair, >= 1. Default 100000. */
 } batten_sections_options;
