@@ -50,7 +50,7 @@ static outcome run(batten_context *ctx, const loft_rule *rule, const batten_loft
 
 static void run_paper(batten_context *ctx) {
   batten_loft_options o = batten_loft_options_default();
-  o.degree = 3;
+  o.degree_z = 3;
   outcome r = run(ctx, &(loft_rule){.kind = LOFT_PAPER, .degree = 2, .smoothness = 1}, &o);
   const batten_loft_info *f = &r.info;
   printf("\n## The paper's example: four quadratic C^1 contours on different knots, equal distances\n\n");

@@ -114,8 +114,8 @@ static int fit(batten_context *ctx, const char *way, const char *scene, const ch
   bool is_free = strcmp(way, "free") == 0, good = false;
   batten_loft_options o = batten_loft_options_default();
   if (strcmp(way, "loft") != 0) {
-    o.smoothness = 1;
-    o.degree = 3;
+    o.smooth_z = 1;
+    o.degree_z = 3;
   }
   batten_status st = make_contours(ctx, &s, curves, heights);
   while (st >= 0 && (builds == 0 || (builds < LOFT_REPEATS_MAX && batten_now() - begin < seconds))) {

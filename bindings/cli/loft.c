@@ -43,8 +43,8 @@ enum {
 
 static const cli_option table[] = {
     {"output", 'o', "FILE",
-     "surface, by extension: .json (reads back to the same bits), .step .stp .iges .igs (CAD),\n"
-     ".vtu (Bezier cells), or a mesh .ply .obj .stl .off .vtp .vtk; may be given more than once"},
+     "surface, by extension: .json (reads back to the same bits), .step .stp .iges .igs (CAD)\n"
+     ".vtu (Bezier cells), or a mesh .ply .obj .stl .off .vtp .vtk; may be given more than\nonce"},
     {"unconstrained", OPT_UNCONSTRAINED, "FILE", "the surface without inequalities, to compare with; formats as -o"},
     {"contours", OPT_CONTOURS, "FILE",
      "the contours as curves: .json (to be given again), .step .iges .svg .csv .vtk"},
@@ -163,11 +163,11 @@ static bool take_surface(loft_request *q, int key, const char *v) {
   batten_loft_options *o = &q->options;
   switch (key) {
     case OPT_DEGREE_Z:
-      return take_small("--degree-z", v, 3, BATTEN_SURFACE_DEGREE_MAX, &o->degree);
+      return take_small("--degree-z", v, 3, BATTEN_SURFACE_DEGREE_MAX, &o->degree_z);
     case OPT_DEGREE_Z_MAX:
-      return take_small("--degree-z-max", v, 3, BATTEN_SURFACE_DEGREE_MAX, &o->degree_max);
+      return take_small("--degree-z-max", v, 3, BATTEN_SURFACE_DEGREE_MAX, &o->degree_z_max);
     case OPT_SMOOTH_Z:
-      return take_small("--smooth-z", v, 1, 2, &o->smoothness);
+      return take_small("--smooth-z", v, 1, 2, &o->smooth_z);
     case OPT_START_SLOPE:
       return cli_parse_numbers("--start-slope", v, 2, q->slopes[0]);
     case OPT_END_SLOPE:

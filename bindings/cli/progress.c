@@ -129,6 +129,7 @@ static void use_words(char *text, size_t size) {
       {"opt.evaluations_max", "evaluations"},
       {"opt.normals", "normals in the file"},
       {"opt.spline.smoothing", "--smoothing"},
+      {"opt.fit.", "opt."},
       {"memory_limit", "--memory"},
       {"opt.width, opt.height", "--size"},
       {", or opt.improve larger than 0", ""},

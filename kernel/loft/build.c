@@ -203,16 +203,16 @@ static batten_status prepare(build *b, size_t count) {
 
 static batten_status check_degree(build *b, unsigned *degree) {
   unsigned l = b->stack.smoothness, least = 2 * l + 1;
-  *degree = b->opt->degree ? b->opt->degree : 2 * l + 2;
-  if (b->opt->degree && *degree < least)
+  *degree = b->opt->degree_z ? b->opt->degree_z : 2 * l + 2;
+  if (b->opt->degree_z && *degree < least)
     return batten_fail(b->ctx, BATTEN_E_INVALID,
-                       "opt.degree: %u; must be %u or more for smoothness %u, which the contours have", *degree,
+                       "opt.degree_z: %u; must be %u or more for smoothness %u, which the contours have", *degree,
                        least, l);
-  if (b->opt->degree_max < least)
+  if (b->opt->degree_z_max < least)
     return batten_fail(b->ctx, BATTEN_E_INVALID,
-                       "opt.degree_max: %u; must be %u or more for smoothness %u, which the contours have",
-                       b->opt->degree_max, least, l);
-  if (*degree > b->opt->degree_max) *degree = b->opt->degree_max;
+                       "opt.degree_z_max: %u; must be %u or more for smoothness %u, which the contours have",
+                       b->opt->degree_z_max, least, l);
+  if (*degree > b->opt->degree_z_max) *degree = b->opt->degree_z_max;
   return BATTEN_OK;
 }
 
@@ -220,7 +220,7 @@ static batten_status attempts(build *b, unsigned degree) {
   bool done = false;
   batten_status st = BATTEN_OK;
   for (unsigned knots = 0; st >= 0 && !done; knots++) {
-    for (unsigned n = degree; n <= b->opt->degree_max && st >= 0 && !done; n++) st = try_degree(b, n, &done);
+    for (unsigned n = degree; n <= b->opt->degree_z_max && st >= 0 && !done; n++) st = try_degree(b, n, &done);
     if (st < 0 || done || knots == b->opt->knot_rounds || b->best.result.elastic_count == 0) break;
     for (size_t k = 0; k < b->best.result.elastic_count && st >= 0; k++)
       st = insert_near(b, &b->best.result.elastic[k]);

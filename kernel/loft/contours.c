@@ -242,7 +242,7 @@ batten_status loft_stack_make(batten_context *ctx, size_t count, const batten_cu
   memset(raw, 0, all * sizeof *raw);
   st = make_all(ctx, count, contours, opt, &s, raw);
   if (st >= 0) st = contours_check_directions(ctx, count, raw);
-  if (st >= 0) st = contours_smoothness(ctx, all, raw, opt->smoothness, &s.smoothness);
+  if (st >= 0) st = contours_smoothness(ctx, all, raw, opt->smooth_z, &s.smoothness);
   if (st >= 0) st = contours_merge(ctx, all, raw, opt->knot_tolerance, s.smoothness);
   if (st >= 0) st = fill(ctx, raw, heights, &s);
   for (size_t i = 0; i < all; i++) contours_raw_free(ctx, raw + i);

@@ -57,7 +57,7 @@ static batten_status refuse(batten_context *ctx, const contours_raw *r, double t
   if (jump == 2)
     return batten_fail(ctx, BATTEN_E_INVALID,
                        "%s: %s, its second derivative jumps (%.2g of the contours' size on the shorter span), but "
-                       "opt.smoothness is %u; ask for 1, or for 0, or fit it with smoothness 2",
+                       "opt.smooth_z is %u; ask for 1, or for 0, or fit it with smoothness 2",
                        r->name, where, amount, wanted);
   return batten_fail(ctx, BATTEN_E_INVALID,
                      "%s: %s, its %s jumps (%.2g of the contours' size on the shorter span); a loft needs %s there: "
@@ -94,7 +94,7 @@ batten_status contours_smoothness(batten_context *ctx, size_t count, const conto
   unsigned least = wanted ? wanted : 2;
   if (raw->b.degree == 2 && wanted == 2)
     return batten_fail(ctx, BATTEN_E_INVALID,
-                       "opt.smoothness: 2, but contours of degree 2 have one continuous derivative; ask for 1, or "
+                       "opt.smooth_z: 2, but contours of degree 2 have one continuous derivative; ask for 1, or "
                        "for 0, or fit contours of a higher degree");
   if (raw->b.degree == 2) least = 1;
   batten_status st = BATTEN_OK;

@@ -6,7 +6,7 @@ enum { ROUNDS_MAX = 100, DEPTH_MAX = 10, KNOT_ROUNDS_MAX = 10, SAMPLES_MAX = 100
 
 batten_loft_options batten_loft_options_default(void) {
   return (batten_loft_options){.struct_size = sizeof(batten_loft_options),
-                               .degree_max = BATTEN_SURFACE_DEGREE_MAX,
+                               .degree_z_max = BATTEN_SURFACE_DEGREE_MAX,
                                .knot_tolerance = 1e-12,
                                .tension = 0.001,
                                .samples = 20,
@@ -20,17 +20,17 @@ batten_loft_options batten_loft_options_default(void) {
 
 /* Smoothness 0 allows what one derivative does: what the contours have is not known here. */
 static batten_status check_degrees(batten_context *ctx, const batten_loft_options *o) {
-  if (o->smoothness > 2)
-    return batten_fail(ctx, BATTEN_E_INVALID, "opt.smoothness: %u; must be 1 or 2, or 0 (as the contours)",
-                       o->smoothness);
-  unsigned least = 2 * (o->smoothness ? o->smoothness : 1) + 1;
-  if (o->degree_max < least || o->degree_max > BATTEN_SURFACE_DEGREE_MAX)
-    return batten_fail(ctx, BATTEN_E_INVALID, "opt.degree_max: %u; must be %u .. %d", o->degree_max, least,
+  if (o->smooth_z > 2)
+    return batten_fail(ctx, BATTEN_E_INVALID, "opt.smooth_z: %u; must be 1 or 2, or 0 (as the contours)",
+                       o->smooth_z);
+  unsigned least = 2 * (o->smooth_z ? o->smooth_z : 1) + 1;
+  if (o->degree_z_max < least || o->degree_z_max > BATTEN_SURFACE_DEGREE_MAX)
+    return batten_fail(ctx, BATTEN_E_INVALID, "opt.degree_z_max: %u; must be %u .. %d", o->degree_z_max, least,
                        BATTEN_SURFACE_DEGREE_MAX);
-  if (o->degree != 0 && (o->degree < least || o->degree > o->degree_max))
+  if (o->degree_z != 0 && (o->degree_z < least || o->degree_z > o->degree_z_max))
     return batten_fail(ctx, BATTEN_E_INVALID,
-                       "opt.degree: %u; must be %u .. %u (2 smoothness + 1 .. degree_max), or 0", o->degree, least,
-                       o->degree_max);
+                       "opt.degree_z: %u; must be %u .. %u (2 smooth_z + 1 .. degree_z_max), or 0", o->degree_z,
+                       least, o->degree_z_max);
   return BATTEN_OK;
 }
 
@@ -38,7 +38,7 @@ static batten_status check_counts(batten_context *ctx, const batten_loft_options
   const struct {
     const char *name;
     unsigned value, least, most;
-  } counts[] = {{"samples", o->samples, o->degree > 3 ? o->degree : 3, SAMPLES_MAX},
+  } counts[] = {{"samples", o->samples, o->degree_z > 3 ? o->degree_z : 3, SAMPLES_MAX},
                 {"rounds", o->rounds, 1, ROUNDS_MAX},
                 {"depth_max", o->depth_max, 0, DEPTH_MAX},
                 {"knot_rounds", o->knot_rounds, 0, KNOT_ROUNDS_MAX}};

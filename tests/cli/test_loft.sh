@@ -58,9 +58,9 @@ run 1 "plane.txt: contours: 1 in the file; a loft goes through two or more" loft
 run 1 "two.txt: contours: the file tells no heights; give points x y z, or --gap" loft two.txt
 awk 'BEGIN { for (k = 0; k < 3; k++) { for (i = 0; i < 9; i++) print i, i * i, k % 2; print "" } }' >same.txt
 run 1 "same.txt: contours: 0 and 2 lie in one plane, at the height 0; a loft goes through one contour in each plane" loft same.txt
-run 1 "vase.txt" loft vase.txt --closed --degree-z 4 --degree-z-max 4 --smooth-z 2
+run 1 "batten: --degree-z-max: 4; must be 5 .. 9" loft vase.txt --closed --degree-z 4 --degree-z-max 4 --smooth-z 2
 printf '0 0 0\n1 1 0\n\n0 0 1\n1 1 1\n' >short.txt
-run 1 "short.txt: " loft short.txt
+run 1 "slice 0 has fewer than 3 points" loft short.txt
 rm -f plane.txt two.txt same.txt short.txt
 nothing_new "after all failures"
 
@@ -88,7 +88,7 @@ check "the mesh is a tube" python3 -c '
 import subprocess, sys, json
 subprocess.run([sys.argv[1], "inspect", "vase.ply", "--quiet", "--report", "mesh.json"], check=True)
 m = json.load(open("mesh.json"))
-assert m["triangles"] > 1000, m' "$batten"
+assert m["mesh_triangles"] > 1000, m' "$batten"
 
 # ---- options ------------------------------------------------------------------------------------
 

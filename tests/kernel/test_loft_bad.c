@@ -100,7 +100,7 @@ static void test_contours(batten_context *ctx, const batten_curve *arc) {
 
 static void test_smoothness(batten_context *ctx, const batten_curve *arc) {
   batten_loft_options two = batten_loft_options_default();
-  two.smoothness = 2;
+  two.smooth_z = 2;
   batten_curve *corner = make_arc(ctx, 3, 3, 3, 0), *once = make_arc(ctx, 3, 2, 3, 0),
                *quadratic = make_arc(ctx, 2, 1, 3, 0);
   T_STATUS(make(ctx, arc, corner, NULL), BATTEN_E_INVALID, ctx,
@@ -108,7 +108,7 @@ static void test_smoothness(batten_context *ctx, const batten_curve *arc) {
   T_STATUS(make(ctx, arc, once, &two), BATTEN_E_INVALID, ctx,
            "contours[2]: at the knot 0.25, which is there 2 times, its second derivative jumps");
   T_STATUS(make(ctx, quadratic, quadratic, &two), BATTEN_E_INVALID, ctx,
-           "opt.smoothness: 2, but contours of degree 2 have one");
+           "opt.smooth_z: 2, but contours of degree 2 have one");
   T_OK(make(ctx, arc, once, NULL), ctx);
   batten_curve *ring = make_ring(ctx, 1, 0), *pointed = make_ring(ctx, 1, 0.3);
   T_OK(make(ctx, ring, ring, NULL), ctx);

@@ -48,7 +48,7 @@ static batten_status build(batten_context *ctx, const loft_scene *scene, unsigne
 
 static errors measure(batten_context *ctx, const loft_rule *rule, unsigned degree) {
   batten_loft_options opt = batten_loft_options_default();
-  opt.smoothness = rule->smoothness;
+  opt.smooth_z = rule->smoothness;
   loft_scene scene = loft_scene_make(ctx, rule);
   batten_loft *loft = NULL;
   double size = 0;
@@ -76,7 +76,7 @@ static void invariances(batten_context *ctx, bool closed) {
                     .rotation = 0.3,
                     .seed = 5};
   batten_loft_options opt = batten_loft_options_default();
-  opt.smoothness = rule.smoothness;
+  opt.smooth_z = rule.smoothness;
   loft_scene first = loft_scene_make(ctx, &rule);
   batten_loft *loft = NULL, *other = NULL;
   double size, domain[2] = {0, 8}, scale[4] = {0x1p20, 0, 0, 0x1p20}, turn[4] = {0, -1, 1, 0};

@@ -103,7 +103,7 @@ static void check_stack(batten_context *ctx, uint64_t seed, bool small, tally *s
   if (small) r.contours = 3 + r.contours % 3;
   loft_scene s = loft_scene_make(ctx, &r);
   batten_loft_options o = batten_loft_options_default();
-  o.smoothness = r.smoothness;
+  o.smooth_z = r.smoothness;
   for (unsigned e = 0; e < 2; e++) o.slopes[e] = s.slopes[e];
   batten_loft *loft = NULL;
   batten_loft_info info = {0};

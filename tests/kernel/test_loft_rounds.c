@@ -99,7 +99,8 @@ static void test_stacks(void) {
   batten_context_free(ctx);
 }
 
-/* More rounds never give a larger objective. */
+/* More rounds never give a larger objective, but than what settling the turns found where the first rounds left some:
+ * programs end within their gain of that. */
 static void test_rounds(const loft_rule *rule, unsigned degree) {
   batten_context *ctx = t_context(NULL, NULL, 1);
   double last = INFINITY, first = 0;
@@ -113,7 +114,7 @@ static void test_rounds(const loft_rule *rule, unsigned degree) {
     if (!solve(ctx, rule, degree, 1, &opt, &c, &a)) break;
     if (a.result.feasible) {
       if (!feasible++) first = a.objective;
-      falls = falls && a.objective <= last;
+      falls = falls && a.objective <= (1 + 1e-3) * last;
       last = a.objective;
     } else {
       falls = falls && !feasible;

@@ -24,10 +24,10 @@ typedef struct batten_loft batten_loft; /* never changes */
 
 typedef struct batten_loft_options {
   size_t struct_size;
-  unsigned smoothness; /* l: continuous derivatives by z across contours, 1 or 2; contours must have as many by t. 0:
+  unsigned smooth_z; /* l: continuous derivatives by z across contours, 1 or 2; contours must have as many by t. 0:
                           2 where all contours have two, else 1. Default 0. */
-  unsigned degree;     /* n, by z: 2 l + 1 .. degree_max. 0: 2 l + 2. Default 0. */
-  unsigned degree_max; /* up to which it may be raised where there is no solution, .. BATTEN_SURFACE_DEGREE_MAX.
+  unsigned degree_z; /* n, by z: 2 l + 1 .. degree_z_max. 0: 2 l + 2. Default 0. */
+  unsigned degree_z_max; /* up to which it may be raised where there is no solution, .. BATTEN_SURFACE_DEGREE_MAX.
                           Default 9. */
   double knot_tolerance; /* knots of different contours that differ by less than this part of the domain are made
                             equal, those of the later contour moving: >= 0, < 0.1. Larger ones mean fewer, longer
@@ -37,7 +37,7 @@ typedef struct batten_loft_options {
   double tension; /* of the legs of sections' polygons and the trajectories of first and last control points (closed:
                      of all), against their bending by z, >= 0; does not depend on units. More: smoother from contour
                      to contour, but with more to put right in the sections between. Default 0.001. */
-  unsigned samples; /* S of eq. 12: heights in a patch at which legs are compared, >= degree. Default 20. */
+  unsigned samples; /* S of eq. 12: heights in a patch at which legs are compared, >= degree_z. Default 20. */
 
   /* The inequalities. */
   unsigned rounds;      /* of inequalities and quadratic program for each degree and knots, 1 .. 100. Default 6. */
