@@ -65,8 +65,8 @@ static batten_status map_knots(batten_context *ctx, contours_raw *r, const doubl
   return BATTEN_OK;
 }
 
-/* A copy. middle NULL: a slope, by height. */
-static batten_status copy_curve(batten_context *ctx, const batten_curve *curve, const loft_stack *s, bool slope,
+/* A copy. Slopes are by height, and have no middle. */
+static batten_status copy_curve(batten_context *ctx, const batten_curve *curve, const loft_stack *s,
                                 contours_raw *r) {
   batten_curve_form f = batten_curve_get(curve);
   size_t count = f.knot_count - f.degree - 1;
@@ -75,9 +75,9 @@ static batten_status copy_curve(batten_context *ctx, const batten_curve *curve, 
   r->points = batten_alloc_array(ctx, count, 2 * sizeof *r->points);
   if (!r->knots || !r->points) return BATTEN_E_NOMEM;
   r->b = (bspline){f.degree, count, r->knots};
-  int exponent = ilogb(s->unit) - (slope ? ilogb(s->height_unit) : 0);
+  int exponent = ilogb(s->unit) - (r->slope ? ilogb(s->height_unit) : 0);
   for (size_t j = 0; j < 2 * count; j++) {
-    double p = f.control_points[j] - (slope ? 0 : s->middle[j % 2]);
+    double p = f.control_points[j] - (r->slope ? 0 : s->middle[j % 2]);
     r->points[j] = ldexp(p, exponent);
     if (!isfinite(r->points[j]) || fabs(r->points[j]) > 0x1p500)
       return batten_fail(
@@ -90,12 +90,12 @@ static batten_status copy_curve(batten_context *ctx, const batten_curve *curve, 
 }
 
 /* Of the stack's degree. */
-static batten_status make_raw(batten_context *ctx, const batten_curve *curve, const loft_stack *s, bool slope,
-                              contours_raw *r) {
-  if (batten_curve_get(curve).degree == s->degree) return copy_curve(ctx, curve, s, slope, r);
+static batten_status make_raw(batten_context *ctx, const batten_curve *curve, const loft_stack *s, contours_raw *r) {
+  r->raised = s->degree - batten_curve_get(curve).degree;
+  if (r->raised == 0) return copy_curve(ctx, curve, s, r);
   batten_curve *raised = NULL;
   batten_status st = batten_curve_elevate(ctx, curve, s->degree, &raised);
-  if (st >= 0) st = copy_curve(ctx, raised, s, slope, r);
+  if (st >= 0) st = copy_curve(ctx, raised, s, r);
   batten_curve_free(raised);
   return st;
 }
@@ -106,12 +106,13 @@ static batten_status make_all(batten_context *ctx, size_t count, const batten_cu
   batten_status st = BATTEN_OK;
   for (size_t i = 0; i < count && st >= 0; i++) {
     snprintf(raw[i].name, sizeof raw[i].name, "contours[%zu]", i);
-    st = make_raw(ctx, contours[i], s, false, raw + i);
+    st = make_raw(ctx, contours[i], s, raw + i);
   }
   for (size_t e = 0; e < 2 && st >= 0; e++) {
     contours_raw *r = raw + count + e;
     snprintf(r->name, sizeof r->name, "opt.slopes[%zu]", e);
-    if (opt->slopes[e]) st = make_raw(ctx, opt->slopes[e], s, true, r);
+    r->slope = true;
+    if (opt->slopes[e]) st = make_raw(ctx, opt->slopes[e], s, r);
   }
   return st;
 }

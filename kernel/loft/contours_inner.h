@@ -7,8 +7,9 @@
 /* A curve as it came, but scaled, over [0, 1] and of the stack's degree; clamped, closed or not. */
 typedef struct contours_raw {
   char name[32]; /* in error texts: contours[3], opt.slopes[0] */
-  bool closed;
-  bspline b; /* its knots are `knots` */
+  bool closed, slope;
+  unsigned raised; /* by so many degrees: each knot is there so many times more than it was given */
+  bspline b;       /* its knots are `knots` */
   double *knots;
   double *points; /* [b.count][2] */
   double domain[2];

@@ -48,22 +48,21 @@ static unsigned first_jump(const contours_raw *r, size_t before, size_t after, d
 
 static batten_status refuse(batten_context *ctx, const contours_raw *r, double t, unsigned fold, unsigned jump,
                             unsigned wanted, double amount) {
+  static const char *const jumping[3] = {"point", "tangent", "second derivative"};
+  const char *advice = r->slope   ? "give one without that jump, or NULL"
+                       : jump < 2 ? "split all contours at that place (batten_curve_split) and loft the parts, or "
+                                    "fit it anew"
+                                  : "fit it with smoothness 2";
+  char where[96], need[96] = "needs continuous first derivatives";
   double knot = bspline_blend(r->domain[0], r->domain[1], t);
-  char where[96];
   if (t == 0)
     snprintf(where, sizeof where, "where it closes, at t = %.17g", knot);
   else
-    snprintf(where, sizeof where, "at the knot %.17g, which is there %u times", knot, fold);
-  if (jump == 2)
-    return batten_fail(ctx, BATTEN_E_INVALID,
-                       "%s: %s, its second derivative jumps (%.2g of the contours' size on the shorter span), but "
-                       "opt.smooth_z is %u; ask for 1, or for 0, or fit it with smoothness 2",
-                       r->name, where, amount, wanted);
+    snprintf(where, sizeof where, "at the knot %.17g, which is there %u times", knot, fold - r->raised);
+  if (jump == 2) snprintf(need, sizeof need, "with opt.smooth_z %u needs more: ask for 1, or for 0, or", wanted);
   return batten_fail(ctx, BATTEN_E_INVALID,
-                     "%s: %s, its %s jumps (%.2g of the contours' size on the shorter span); a loft needs %s there: "
-                     "split all contours at that place (batten_curve_split) and loft the parts, or fit it anew",
-                     r->name, where, jump == 0 ? "point" : "tangent", amount,
-                     jump == 0 ? "a continuous contour" : "continuous first derivatives");
+                     "%s: %s, its %s jumps (%.2g of the contours' size on the shorter span); a loft %s%s %s", r->name,
+                     where, jumping[jump], amount, need, jump == 2 ? "" : ":", advice);
 }
 
 /* At most `wanted` (2 if that is 0); below 1, or below what is wanted, it is refused. */

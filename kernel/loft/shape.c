@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "base/checked.h"
+#include "basis/refine.h"
 #include "shape_inner.h"
 
 /* Of the domain: inflections of neighbours inside spans that are nearer are one. */
@@ -159,8 +160,6 @@ static batten_status tell_crossing(batten_context *ctx, loft_stack *s, size_t i,
   return st;
 }
 
-/* ---- all together -------------------------------------------------------------------------------- */
-
 static batten_status look_at(batten_context *ctx, loft_stack *s, size_t i, shape_places *out) {
   batten_curve *curve = NULL;
   batten_status st = shape_curve(ctx, s->contours + i, &curve);
@@ -179,6 +178,51 @@ static void mark_flat(loft_contour *c, const shape_places *places) {
     if (c->space.closed && p->t == 0) c->flat_above[c->space.spans] = 1;
   }
 }
+
+/* ---- slopes -------------------------------------------------------------------------------------- */
+
+/* The vertices whose x'' is that at t, a knot degree - 2 fold or more: *count from the one returned on. */
+static size_t find_vertices(const loft_space *s, double t, size_t *count) {
+  size_t span = shape_span(s, t), d = s->degree, last = s->first[span];
+  if (s->breaks[span] != t) { /* 1, where it is open */
+    *count = 1;
+    return last + d - 2;
+  }
+  *count = last > 0 || s->closed ? s->folds[span] + 3 - d : 1;
+  return last + 1 - *count + (*count > last + 1 ? s->count : 0);
+}
+
+/* Sections beside an end whose slope has x'' not 0 at a flat point are not flat there, and their inflection runs away
+ * from it: told, for no inequality can help. What is rounding is taken off: the control points in the middle give
+ * way. */
+static batten_status settle_slope(batten_context *ctx, loft_stack *s, size_t end, const shape_places *places) {
+  size_t i = end ? s->count - 1 : 0;
+  const loft_space *space = &s->contours[i].space;
+  double *slope = s->slopes[end];
+  batten_status st = BATTEN_OK;
+  for (size_t k = 0; k < places->count && slope && s->degree > 2 && st >= 0; k++) {
+    const shape_place *p = places->at + k;
+    if (p->kind != SHAPE_FLAT || !p->partner[end ? 0 : 1]) continue;
+    size_t count, v = find_vertices(space, p->t, &count);
+    bool flat = true;
+    for (size_t q = 0; q < count; q++) flat = flat && contours_is_flat(space, slope, (ptrdiff_t)(v + q));
+    if (!flat) {
+      st = tell(ctx, s, BATTEN_LOFT_SLOPE, i, neighbour(i, end == 0), p->t);
+      continue;
+    }
+    const double *from = slope + 2 * (v % space->count), *to = slope + 2 * ((v + count + 1) % space->count);
+    double whole = loft_interval(space, (ptrdiff_t)v), part = 0;
+    for (size_t q = 1; q <= count; q++) whole += loft_interval(space, (ptrdiff_t)(v + q));
+    for (size_t q = 1; q <= count; q++) {
+      part += loft_interval(space, (ptrdiff_t)(v + q - 1)) / whole;
+      double *point = slope + 2 * ((v + q) % space->count);
+      for (size_t x = 0; x < 2; x++) point[x] = bspline_blend(from[x], to[x], part);
+    }
+  }
+  return st;
+}
+
+/* ---- preparing ----------------------------------------------------------------------------------- */
 
 static batten_status progress(batten_context *ctx, double done, size_t i, size_t count) {
   return batten_progress(ctx, "contours", done + 0.5 * (double)i / (double)count);
@@ -204,7 +248,9 @@ static batten_status prepare(batten_context *ctx, loft_stack *s, double zone, sh
       st = loft_stack_insert(ctx, s, i, knots[i].count, knots[i].knots, knots[i].folds);
     if (st < 0) break;
     mark_flat(s->contours + i, places + i);
-    st = tell_all(ctx, s, i, places);
+    st = i == 0 ? settle_slope(ctx, s, 0, places) : BATTEN_OK;
+    if (i + 1 == s->count && st >= 0) st = settle_slope(ctx, s, 1, places + i);
+    if (st >= 0) st = tell_all(ctx, s, i, places);
     if (st >= 0) st = shape_bend(ctx, s, i, places + i);
   }
   return st;

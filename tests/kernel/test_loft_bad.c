@@ -114,6 +114,11 @@ static void test_smoothness(batten_context *ctx, const batten_curve *arc) {
   T_OK(make(ctx, ring, ring, NULL), ctx);
   T_STATUS(make(ctx, ring, pointed, NULL), BATTEN_E_INVALID, ctx,
            "contours[2]: where it closes, at t = 0, its tangent jumps");
+  /* Knots are told as they were given, not as they are after raising to the highest degree. */
+  batten_curve *broken = make_arc(ctx, 2, 2, 3, 0);
+  T_STATUS(make(ctx, arc, broken, NULL), BATTEN_E_INVALID, ctx,
+           "contours[2]: at the knot 0.25, which is there 2 times, its tangent jumps");
+  batten_curve_free(broken);
   batten_curve_free(pointed);
   batten_curve_free(ring);
   batten_curve_free(quadratic);
@@ -155,7 +160,9 @@ static void test_slopes(batten_context *ctx, const batten_curve *arc) {
   opt.slopes[1] = steep;
   T_STATUS(make(ctx, arc, arc, &opt), BATTEN_E_INVALID, ctx, "opt.slopes[1]: control point 0");
   opt.slopes[1] = line;
-  T_STATUS(make(ctx, arc, arc, &opt), BATTEN_E_INVALID, ctx, "opt.slopes[1]: at the knot 0.25");
+  T_STATUS(make(ctx, arc, arc, &opt), BATTEN_E_INVALID, ctx,
+           "opt.slopes[1]: at the knot 0.25, which is there 1 times, its tangent jumps");
+  T_CHECK(strstr(batten_error(ctx), "give one without that jump, or NULL"), "slopes are not split");
   opt.slopes[1] = arc;
   T_OK(make(ctx, arc, arc, &opt), ctx);
   batten_curve *curves[] = {high, line, ring, late, steep};

@@ -1,4 +1,6 @@
 /* Inflections of contours: knots, partners, notes; polygons that bend as the curves do (assumption 3). */
+#include <float.h>
+
 #include "../../kernel/loft/loft_inner.h"
 #include "../loft_scenes.h"
 #include "tap.h"
@@ -251,6 +253,46 @@ static void test_partners(batten_context *ctx) {
   for (size_t i = 0; i < 3; i++) batten_curve_free(curves[i]);
 }
 
+/* Slopes at a shared inflection: one that is flat there, to rounding, and one that is not. */
+static void test_slopes(batten_context *ctx) {
+  const double breaks[] = {0, 0.2, 0.4, 0.6, 0.8, 1}, heights[2] = {0, 1}, matrix[4] = {0.1, 0.2, -0.1, 0.1};
+  for (size_t end = 0; end < 2; end++)
+    for (int off = 0; off < 3; off++) { /* none, rounding, more */
+      batten_curve *curves[2] = {make_s(ctx, breaks, 5, 2), make_s(ctx, breaks, 5, 2)}, *turned = NULL, *slope = NULL;
+      T_OK(batten_curve_transform(ctx, curves[0], matrix, NULL, NULL, &turned), ctx);
+      batten_curve_form form = batten_curve_get(turned);
+      double points[16];
+      memcpy(points, form.control_points, sizeof points);
+      points[7] += off == 0 ? 0 : off == 1 ? 1e-13 : 1e-6;
+      form.control_points = points;
+      T_OK(batten_curve_create(ctx, &form, &slope), ctx);
+      batten_loft_options opt = batten_loft_options_default();
+      opt.slopes[end] = slope;
+      loft_stack s = {0};
+      T_OK(prepare(ctx, 2, curves, heights, &opt, &s), ctx);
+      const double *p = s.slopes[end] + 2 * 2;
+      double bend = hypot(p[0] + p[4] - 2 * p[2], p[1] + p[5] - 2 * p[3]);
+      if (off < 2) {
+        T_CHECK(s.note_count == 0, "a slope that is flat where the contours are");
+        T_RATIO(bend, 2 * DBL_EPSILON, "it is afterwards");
+      } else {
+        const batten_loft_note *n = s.notes;
+        T_CHECK(s.note_count == 1 && n->remark == BATTEN_LOFT_SLOPE && n->contour == end && n->other == 1 - end &&
+                    n->t == breaks[2] && bend > 1e-7,
+                "one that is not is told, and left");
+      }
+      batten_loft *loft = NULL;
+      batten_loft_info info;
+      batten_status st =
+          batten_loft_build(ctx, 2, (const batten_curve *const *)curves, heights, &opt, &loft, NULL, &info);
+      T_CHECK(st == (off < 2 ? BATTEN_OK : BATTEN_W_ACCURACY), "sections: %s", batten_error(ctx));
+      batten_loft_free(loft);
+      loft_stack_free(ctx, &s);
+      batten_curve *all[] = {curves[0], curves[1], turned, slope};
+      for (size_t k = 0; k < 4; k++) batten_curve_free(all[k]);
+    }
+}
+
 /* Inside a span of a cubic x'' passes through 0 where both ends bend against each other evenly: matched at one t. */
 static void test_inside(batten_context *ctx) {
   const double knots[] = {0, 0, 0, 0, 1, 1, 1, 1}, points[] = {0, 0, 0.3, 0.4, 0.7, -0.4, 1, 0};
@@ -421,6 +463,7 @@ static batten_status call(batten_context *ctx, void *arg) {
 int main(void) {
   batten_context *ctx = t_context(NULL, NULL, 1);
   test_partners(ctx);
+  test_slopes(ctx);
   test_inside(ctx);
   test_kinds(ctx);
   test_loop(ctx);

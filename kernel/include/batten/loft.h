@@ -25,7 +25,7 @@ typedef struct batten_loft batten_loft; /* never changes */
 typedef struct batten_loft_options {
   size_t struct_size;
   unsigned smooth_z; /* l: continuous derivatives by z across contours, 1 or 2; contours must have as many by t. 0:
-                          2 where all contours have two, else 1. Default 0. */
+                          2 where all contours and slopes have two, else 1. Default 0. */
   unsigned degree_z; /* n, by z: 2 l + 1 .. degree_z_max. 0: 2 l + 2. Default 0. */
   unsigned degree_z_max; /* up to which it may be raised where there is no solution, .. BATTEN_SURFACE_DEGREE_MAX.
                           Default 9. */
@@ -33,10 +33,13 @@ typedef struct batten_loft_options {
                             equal, those of the later contour moving: >= 0, < 0.1. Larger ones mean fewer, longer
                             legs; what contours move by is told (knot_shift). Default 1e-12. */
   const batten_curve *slopes[2]; /* dy/dz at the first and the last contour, as curves over the contours' domain, of
-                                    degree d at most, closed as the contours; NULL = free. Default NULL. */
+                                    degree d at most, closed as the contours; NULL = free. Where the contour and its
+                                    neighbour share a flat point (x'' = 0) the slope must be flat, too; where it is
+                                    not this is told (BATTEN_LOFT_SLOPE). Default NULL. */
   double tension; /* of the legs of sections' polygons and the trajectories of first and last control points (closed:
                      of all), against their bending by z, >= 0; does not depend on units. More: smoother from contour
-                     to contour, but with more to put right in the sections between. Default 0.001. */
+                     to contour, but with more to put right in the sections between. Less than 1e-6 counts as that: it
+                     must leave one surface. Default 0.001. */
   unsigned samples; /* S of eq. 12: heights in a patch at which legs are compared, >= degree_z. Default 20. */
 
   /* The inequalities. */
@@ -138,7 +141,9 @@ typedef enum batten_loft_remark {
   BATTEN_LOFT_NOT_FLAT = 2,  /* inflection of `contour` at t where x'' is not 0 */
   BATTEN_LOFT_ELASTIC = 3,   /* inequalities gave way at the polygon's vertex near t between `contour` and `other` */
   BATTEN_LOFT_SELF_CROSSING = 4, /* `contour` crosses itself at t (and elsewhere) */
-  BATTEN_LOFT_STEEP = 5 /* the polygon of `contour` turns by more than eq. 11 allows near t, however many knots */
+  BATTEN_LOFT_STEEP = 5, /* the polygon of `contour` turns by more than eq. 11 allows near t, however many knots */
+  BATTEN_LOFT_SLOPE = 6 /* `contour` and `other` have x'' = 0 at t, but the slope given at `contour` has not: sections
+                           beside it cannot keep their signs there. Give one with x'' = 0 there, or NULL */
 } batten_loft_remark;
 typedef struct batten_loft_note {
   batten_loft_remark remark;
