@@ -253,7 +253,7 @@ static void find_open(job *j) {
 
 /* A curvature in the caller's unit; a proven one not above it, and 0 rather than without all its digits. */
 static double in_units(const sections_plan *plan, double value, bool proven) {
-  value = ldexp(value, plan->surface->exponent);
+  value = ldexp(value, plan->exponent);
   if (proven && fabs(value) < DBL_MIN) return 0;
   return fmax(fmin(value, DBL_MAX), -DBL_MAX);
 }

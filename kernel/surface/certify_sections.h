@@ -8,7 +8,7 @@
  * Euler's theorem on homogeneous functions gives x_u = (1 - s) p + s q, x_uu = m (q - p), hence x_u x x_uu = p x
  * x_uu.
  *
- * Places on a span pair are parts (s, r) of its sides. Points are times 2^exponent of the surface, and both
+ * Places on a span pair are parts (s, r) of its sides. Points are times 2^exponent of the plan, and both
  * derivatives then times powers of two of their own, so that spans and units of any size are alike. All bounds hold
  * in any rounding mode. Rows of coefficients of one s carry one bound: of a short span beside a long one in u, rows
  * differ by the ratio of their lengths. */
@@ -37,11 +37,12 @@ static inline size_t sections_count(const sections_sheet *p) {
 /* What is the same for all span pairs. */
 typedef struct sections_plan {
   const batten_surface *surface;
-  unsigned dim;       /* 2 where the normal is along an axis, else 3 */
-  unsigned axis[3];   /* coordinates that count, those of a plane such that w = [x_u, x_uu] */
-  double normal[3];   /* dim 3: as it was given, times a power of two: 1 .. 2 */
-  double length;      /* its length; dim 2: 1 */
-  double unit;        /* 2^exponent of the surface */
+  unsigned dim;     /* 2 where the normal is along an axis, else 3 */
+  unsigned axis[3]; /* coordinates that count, those of a plane such that w = [x_u, x_uu] */
+  double normal[3]; /* dim 3: as it was given, times a power of two: 1 .. 2 */
+  double length;    /* its length; dim 2: 1 */
+  int exponent;     /* brings the largest coordinate that counts to [1, 2): sections may be small beside the height */
+  double unit;      /* 2^exponent */
   double data_error;  /* rounding of the control points themselves, times unit */
   unsigned degree[2]; /* of the surface */
   /* Binomials, and one over them: of b, of a and both squared; in v. */

@@ -43,8 +43,11 @@ void sections_plan_make(const batten_surface *surface, const double normal[3], s
   }
   const double *n = out->normal;
   if (out->dim == 3) out->length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]) * CERTIFY_UP;
-  out->unit = ldexp(1, surface->exponent);
-  out->data_error = 4 * CERTIFY_EPS * out->unit * largest_coordinate(surface, out->dim, out->axis);
+  double most = largest_coordinate(surface, out->dim, out->axis);
+  out->exponent = most > 0 ? -ilogb(most) : 0;
+  if (out->exponent > 1000) out->exponent = 1000; /* 2^exponent is a double */
+  out->unit = ldexp(1, out->exponent);
+  out->data_error = 4 * CERTIFY_EPS * out->unit * most;
   for (int k = 0; k < 2; k++) out->degree[k] = surface->space[k].degree;
   unsigned m = out->degree[0] - 1, q = out->degree[1];
   for (unsigned k = 0; k < 2; k++) {
@@ -126,7 +129,7 @@ static int normalise(strip *p) {
   for (unsigned j = 0; j <= p->degree; j++) most = fmax(most, p->most[j]);
   if (!(most > 0)) return 0;
   int exponent = -ilogb(most);
-  if (exponent > 400) exponent = 400;
+  if (exponent > 800) exponent = 800; /* CERTIFY_TINY becomes 2^-100 */
   double factor = ldexp(1, exponent);
   for (size_t x = 0; x < (p->degree + 1) * p->width; x++) p->row[x] *= factor;
   for (unsigned j = 0; j <= p->degree; j++) {

@@ -90,7 +90,7 @@ static double cube_above(const sections_sheet *a, size_t k, size_t l) {
     square += c * c;
   }
   square = square * CERTIFY_UP + CERTIFY_TINY;
-  return square * sqrt(square) * CERTIFY_UP;
+  return square * sqrt(square) * CERTIFY_UP + CERTIFY_TINY; /* which may underflow */
 }
 
 /* Curvature of w; a huge one is cut. */
@@ -191,6 +191,7 @@ static void find_chord(const sections_sheet *square, double *alpha, double *beta
   double at_low = low * sqrt(low), at_high = high * sqrt(high), width = high - low;
   *beta = width > 1e-6 * high ? (at_high - at_low) / width : 1.5 * sqrt(high);
   *alpha = fmax(at_high - *beta * high, at_low - *beta * low) + 16 * CERTIFY_EPS * (at_high + *beta * high);
+  *alpha += CERTIFY_TINY; /* powers may underflow */
 }
 
 /* w of a degree higher by 2 in s. */

@@ -341,7 +341,7 @@ static void test_coefficients(batten_context *ctx) {
         size_t i = c & 1 ? p.w.degree[0] : 0, q = s.degree[1], at = c & 1 ? s.degree[0] - 1 : 0;
         const double *x = p.a.c + at * (q + 1) + (c & 2 ? q : 0), *y = x + s.degree[0] * (q + 1);
         double speed = hypot(*x, *y), value = p.w.c[i * (2 * q + 1) + (c & 2 ? 2 * q : 0)];
-        double found = ldexp(value / pow(speed, 3) * p.factor, surface->exponent);
+        double found = ldexp(value / pow(speed, 3) * p.factor, plan.exponent);
         double expected = (double)curvature_at(&s, up, span[0], span[1], place[0], place[1], NULL);
         double error = fabs(value) * 6 * p.a.error[at] / speed + p.w.error[i] + 1e-18 * fabs(value);
         double ratio = fabs(found - expected) / (error / fabs(value) * fabs(expected));
@@ -462,6 +462,17 @@ static void test_limits(batten_context *ctx) {
     for (int d = 0; d < 3; d++) s.control[i][d] = ldexp(s.control[i][d], 2020);
   rough = prove(ctx, &s, NULL);
   T_CHECK(rough.s.certified && rough.s.margin_min >= 0, "huge: > %.3g", rough.s.margin_min);
+  /* Needles, whose sections are next to nothing beside their height: of them the cube of |x_u| underflows. */
+  static const int shift[3] = {-500, -780, -960};
+  for (int k = 0; k < 3; k++) {
+    s = cone(3, 3, 1);
+    for (size_t i = 0; i < 16; i++)
+      for (int d = 0; d < 2; d++) s.control[i][d] = ldexp(s.control[i][d], shift[k]);
+    rough = prove(ctx, &s, NULL);
+    double most = ldexp(0.0895, -shift[k]), proven = rough.s.margin_min;
+    T_CHECK(rough.s.pairs == 1 && rough.s.certified && proven < most && proven > 0.8 * most,
+            "needle by 2^%d: > %.3g of %.3g", shift[k], proven, most);
+  }
 }
 
 static void test_bad(batten_context *ctx) {
