@@ -296,7 +296,7 @@ batten_status loft_objective_new(batten_context *ctx, const loft_stack *stack, c
   make_bent(net->degree, &o->gram, &o->bent);
   st = make_targets(ctx, opt->samples > net->degree ? opt->samples : net->degree, o);
   if (st >= 0) st = objective_make_matrix(ctx, o);
-  if (st >= 0 && net->z.columns > 0) st = block_plan_new(ctx, &o->h, BLOCK_AUTO, &o->plan);
+  if (st >= 0 && net->z.columns > 0) st = block_plan_new(ctx, &o->h, BLOCK_QUICK, &o->plan);
   if (st >= 0 && o->plan) st = block_factor(ctx, o->plan, &o->h, NULL);
   if (st == BATTEN_E_SINGULAR)
     st = batten_fail(ctx, st,

@@ -221,7 +221,7 @@ static batten_status make_plan(work *w) {
         list[at++] = w->corners[k].unknown[j];
       }
   st = block_matrix_new(w->ctx, h->rows, 2, at / 2, list, &w->a);
-  if (st >= 0) st = block_plan_new(w->ctx, &w->a, BLOCK_AUTO, &w->plan);
+  if (st >= 0) st = block_plan_new(w->ctx, &w->a, BLOCK_QUICK, &w->plan);
 done:
   batten_free(w->ctx, list);
   return st;

@@ -112,11 +112,11 @@ static batten_status choose(batten_context *ctx, const block_matrix *a, block_pl
     st = sparse_order_degree(ctx, &g, order);
     if (st >= 0) st = block_graph(ctx, a, &g);
     if (st >= 0) st = block_fronts_new(ctx, &g, plan->size, order, &plan->fronts);
-    if (st >= 0 && rows > DISSECTED) st = try_dissection(ctx, &g, plan, order);
+    if (st >= 0 && rows > DISSECTED && plan->method != BLOCK_QUICK) st = try_dissection(ctx, &g, plan, order);
   }
   if (st < 0) goto done;
   size_t n = rows * plan->size, width = band_width(plan->size, apart);
-  if (plan->method == BLOCK_AUTO)
+  if (plan->method == BLOCK_AUTO || plan->method == BLOCK_QUICK)
     plan->method = band_seconds(n, width) < plan->fronts.seconds ? BLOCK_BAND : BLOCK_SUPERNODAL;
   if (plan->method == BLOCK_BAND) {
     if (plan->fronts.order) block_fronts_free(ctx, &plan->fronts);

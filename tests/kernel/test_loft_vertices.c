@@ -5,6 +5,7 @@
 
 #include "loft/loft_inner.h"
 #include "loft_rig.h"
+#include "loft_scenes.h"
 #include "tap.h"
 
 /* A square's corner, twice as large above and turned by a quarter. */
@@ -192,6 +193,71 @@ static void whole_turns(batten_context *ctx) {
   loft_stack_free_rig(ctx, &stack);
 }
 
+/* Degree 1 by z between both polygons of a patch. */
+static batten_surface *rule_patch(batten_context *ctx, const loft_slab *slab) {
+  const loft_space *s = &slab->space;
+  size_t count = 0;
+  double *knots = NULL;
+  const double heights[4] = {0, 0, 1, 1};
+  loft_matrix m = {0};
+  batten_surface *out = NULL;
+  if (loft_clamped(ctx, s, &count, &knots, &m) < 0) abort();
+  double *end = malloc(2 * m.rows * sizeof *end), *points = malloc(6 * m.rows * sizeof *points);
+  if (!end || !points) abort();
+  for (size_t e = 0; e < 2; e++) {
+    loft_matrix_apply(&m, slab->end[e], end);
+    for (size_t j = 0; j < m.rows; j++) {
+      double *p = points + 3 * (2 * j + e);
+      p[0] = end[2 * j];
+      p[1] = end[2 * j + 1];
+      p[2] = (double)e;
+    }
+  }
+  const batten_surface_form form = {{s->degree, 1}, {count, 4}, {knots, heights}, points};
+  if (batten_surface_create(ctx, &form, &out) < 0) abort();
+  free(points);
+  free(end);
+  batten_free(ctx, knots);
+  loft_matrix_free(ctx, &m);
+  return out;
+}
+
+/* Where the proof wants a sign of a span every vertex that acts on it must have been asked to keep it, or be flat. */
+static void asked_and_proven(batten_context *ctx) {
+  size_t pairs = 0, without = 0;
+  for (uint64_t seed = 1; seed <= 120; seed++) {
+    loft_rule rule = loft_rule_random(seed);
+    if (!rule.unmatched && seed % 4) continue; /* those are the hard ones */
+    loft_scene scene = loft_scene_make(ctx, &rule);
+    const batten_loft_options opt = batten_loft_options_default();
+    loft_stack s = {0};
+    loft_slab *slabs = NULL;
+    T_OK(loft_stack_make(ctx, scene.count, (const batten_curve *const *)scene.contours, scene.heights, &opt, &s),
+         ctx);
+    if (loft_shape_prepare(ctx, &s, &opt) < 0 || rig_slabs(ctx, &s, &slabs) < 0) abort();
+    for (size_t i = 0; i + 1 < s.count; i++) {
+      const loft_space *space = &slabs[i].space;
+      batten_surface *patch = rule_patch(ctx, &slabs[i]);
+      batten_sections sections;
+      signed char *verdicts = malloc(space->spans);
+      if (!verdicts || batten_surface_certify_sections(ctx, patch, NULL, &sections, verdicts) < 0) abort();
+      for (size_t span = 0; span < space->spans; span++)
+        for (size_t k = 0; k + 2 <= s.degree && verdicts[span] != 0; k++) {
+          int wanted = slabs[i].wanted[(space->first[span] + k) % loft_vertices(space)];
+          pairs += k == 0;
+          without += wanted == LOFT_FREE;
+        }
+      free(verdicts);
+      batten_surface_free(patch);
+    }
+    loft_slabs_free(ctx, s.count - 1, slabs);
+    loft_stack_free(ctx, &s);
+    loft_scene_free(&scene);
+  }
+  T_CHECK(pairs > 5000 && without == 0, "%zu span pairs have signs to be proven, %zu free vertices act on them",
+          pairs, without);
+}
+
 static batten_status run(batten_context *ctx, void *arg) {
   loft_stack stack = rig_random(NULL, 5, 3, true, 3, 1.0);
   loft_slab *slabs = NULL;
@@ -210,6 +276,7 @@ int main(void) {
   flat_points(ctx);
   zero_leg(ctx);
   whole_turns(ctx);
+  asked_and_proven(ctx);
   T_CHECK(batten_bytes_in_use(ctx) == 0, "nothing is left");
   t_fail_every_allocation("angles and signs", run, NULL);
   batten_context_free(ctx);

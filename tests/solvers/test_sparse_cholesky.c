@@ -5,7 +5,7 @@
 #include "la/la.h"
 #include "sparse/fronts.h"
 
-static const char *const names[] = {"auto", "band", "supernodal"};
+static const char *const names[] = {"auto", "band", "supernodal", "quick"};
 
 /* b := A^-1 b; false when something went wrong. */
 static bool solve_by(batten_context *ctx, const block_matrix *a, block_method method, double *b, block_method *used) {
@@ -21,7 +21,7 @@ static bool solve_by(batten_context *ctx, const block_matrix *a, block_method me
 static void test_hand(batten_context *ctx) {
   /* [4 2 0; 2 5 2; 0 2 5] = L L', L = [2 0 0; 1 2 0; 0 1 2]; A (1, 1, 1) = (6, 9, 7) */
   static const uint32_t pairs[] = {0, 1, 1, 2};
-  for (int method = BLOCK_BAND; method <= BLOCK_SUPERNODAL; method++) {
+  for (int method = BLOCK_BAND; method <= BLOCK_QUICK; method++) {
     block_matrix a;
     T_OK(block_matrix_new(ctx, 3, 1, 2, pairs, &a), ctx);
     for (size_t i = 0; i < 3; i++) *block_matrix_at(&a, i, i) = i ? 5 : 4;
@@ -60,7 +60,7 @@ static void compare(batten_context *ctx, const char *what, const scene_graph *g,
     memset(truth, 0, n * sizeof *truth);
     T_OK(block_cg(ctx, &a, b, 1e-13, 3000, "solve", truth, &figures), ctx);
   }
-  for (int method = BLOCK_AUTO; method <= BLOCK_SUPERNODAL; method++) {
+  for (int method = BLOCK_AUTO; method <= BLOCK_QUICK; method++) {
     block_method used = BLOCK_AUTO;
     memcpy(x, b, n * sizeof *b);
     bool ok = solve_by(ctx, &a, (block_method)method, x, &used);
@@ -111,7 +111,7 @@ static void test_graphs(batten_context *ctx) {
   block_matrix a;
   block_plan *plan;
   T_OK(block_matrix_new(ctx, 0, 5, 0, NULL, &a), ctx);
-  for (int method = BLOCK_AUTO; method <= BLOCK_SUPERNODAL; method++) {
+  for (int method = BLOCK_AUTO; method <= BLOCK_QUICK; method++) {
     T_OK(block_plan_new(ctx, &a, (block_method)method, &plan), ctx);
     T_OK(block_factor(ctx, plan, &a, NULL), ctx);
     block_solve(ctx, plan, NULL);
@@ -179,11 +179,17 @@ static void test_choice(batten_context *ctx) {
             block_plan_bytes(plan));
     /* n (w + 1)^2 with w = 1 for a chain */
     if (!square) T_CHECK(block_plan_flops(plan) == 800 * 4, "a chain's band takes %g flops", block_plan_flops(plan));
+    double least = block_plan_flops(plan);
     size_t told = block_plan_bytes(plan), held = batten_bytes_in_use(ctx);
     block_plan_free(ctx, plan);
     held -= batten_bytes_in_use(ctx);
     T_RATIO(fabs((double)held - (double)told), 0.02 * (double)told + 2048, "bytes held, %zu, beside those told",
             held);
+    block_plan *quick;
+    T_OK(block_plan_new(ctx, &a, BLOCK_QUICK, &quick), ctx);
+    T_CHECK(block_plan_method(quick) == (square ? BLOCK_SUPERNODAL : BLOCK_BAND) && block_plan_flops(quick) >= least,
+            "quick: %.3g flops", block_plan_flops(quick));
+    block_plan_free(ctx, quick);
     block_matrix_free(ctx, &a);
     free(g.pairs);
   }
@@ -198,7 +204,7 @@ static void test_again(batten_context *ctx) {
   size_t n = g.rows * 5, row = 0;
   double *x = scene_vector(n, &seed), *b = malloc(n * sizeof *b), *r = malloc(n * sizeof *r);
   memcpy(b, x, n * sizeof *b);
-  for (int method = BLOCK_BAND; method <= BLOCK_SUPERNODAL; method++) {
+  for (int method = BLOCK_BAND; method <= BLOCK_QUICK; method++) {
     block_plan *plan;
     T_OK(block_plan_new(ctx, &a, (block_method)method, &plan), ctx);
     T_OK(block_factor(ctx, plan, &a, NULL), ctx);
@@ -284,7 +290,7 @@ int main(void) {
   scene_graph g = scene_grid(30, 20, false);
   t_fail_every_allocation("dissection", dissected, &g);
   free(g.pairs);
-  for (block_method method = BLOCK_AUTO; method <= BLOCK_SUPERNODAL; method++)
+  for (block_method method = BLOCK_AUTO; method <= BLOCK_QUICK; method++)
     t_fail_every_allocation(names[method], whole, &method);
   T_CHECK(batten_bytes_in_use(ctx) == 0, "all memory is given back");
   batten_context_free(ctx);
