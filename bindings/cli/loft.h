@@ -25,6 +25,7 @@ typedef struct loft_work {
   batten_plane base;       /* where they begin */
   bool planar;             /* the file knows of no planes: heights are along z */
   bool matched;            /* the contours come from slices */
+  size_t left_out;         /* of them: too few points */
   batten_loft_match_info match;
   batten_curve *slopes[2];
   batten_loft *loft, *unconstrained;

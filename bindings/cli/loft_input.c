@@ -1,5 +1,6 @@
 /* Input of `batten loft`: curves, or slices that become curves; in parallel planes, by ascending height. */
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -29,6 +30,8 @@ static batten_status find_places(loft_work *w, size_t count, const batten_plane 
   if (st >= 0 && planes) st = batten_plane_stack(ctx, count, planes, &w->base, found);
   if (st >= 0 && !planes && isnan(w->request->gap))
     st = batten_fail(ctx, BATTEN_E_INVALID, "contours: the file tells no heights; give points x y z, or --gap");
+  if (st >= 0 && planes && !isnan(w->request->gap))
+    st = batten_fail(ctx, BATTEN_E_INVALID, "contours: the file tells their heights; leave --gap away");
   if (st < 0) goto done;
   for (size_t i = 0; i < count; i++) {
     out[i] = (place){i, planes ? found[i] : flat};
@@ -102,14 +105,38 @@ static void slices_free(batten_context *ctx, slices *s) {
   batten_free(ctx, s->starts);
 }
 
+/* No curve that bends goes through one or two points, as tables of offsets have them at the stem. */
+static batten_status leave_out(loft_work *w, const batten_contours *c, place *places) {
+  size_t kept = 0;
+  double first = 0;
+  for (size_t i = 0; i < c->count; i++) {
+    size_t points = c->starts[places[i].number + 1] - c->starts[places[i].number];
+    if (points >= 3)
+      places[kept++] = places[i];
+    else if (w->left_out++ == 0)
+      first = places[i].at.height;
+  }
+  w->count = kept;
+  if (kept < 2)
+    return batten_fail(w->run.ctx, BATTEN_E_INVALID,
+                       "contours: %zu in the file with 3 points or more; a loft goes through two or more", kept);
+  if (w->left_out == 0) return BATTEN_OK;
+  cli_run_warn(&w->run, batten_fail(w->run.ctx, BATTEN_W_SHAPE,
+                                    "contours: %zu of fewer than 3 points left out, the first at the height %.9g; the "
+                                    "surface does without them",
+                                    w->left_out, first));
+  w->status = BATTEN_W_SHAPE;
+  return BATTEN_OK;
+}
+
 static batten_status order_slices(loft_work *w, const batten_contours *c, const place *places, slices *out) {
   batten_context *ctx = w->run.ctx;
   size_t all = c->starts[c->count], at = 0;
-  out->starts = batten_alloc_array(ctx, c->count + 1, sizeof *out->starts);
+  out->starts = batten_alloc_array(ctx, w->count + 1, sizeof *out->starts);
   out->points = batten_alloc_array(ctx, all, 2 * sizeof *out->points);
   if (c->weights) out->weights = batten_alloc_array(ctx, all, sizeof *out->weights);
   if (!out->starts || !out->points || (c->weights && !out->weights)) return BATTEN_E_NOMEM;
-  for (size_t i = 0; i < c->count; i++) {
+  for (size_t i = 0; i < w->count; i++) {
     const batten_plane_place *p = &places[i].at;
     out->starts[i] = at;
     w->heights[i] = p->height;
@@ -120,19 +147,30 @@ static batten_status order_slices(loft_work *w, const batten_contours *c, const 
       if (c->weights) out->weights[at] = c->weights[k];
     }
   }
-  out->starts[c->count] = at;
+  out->starts[w->count] = at;
   return BATTEN_OK;
 }
 
-static batten_status match(loft_work *w, size_t count, const slices *s) {
+/* Slices are numbered by height, not as in the file: the height tells which one a text is about. */
+static void tell_height(const loft_work *w, batten_status st) {
+  char text[512];
+  size_t slice = 0;
+  int head = 0;
+  snprintf(text, sizeof text, "%s", batten_error(w->run.ctx));
+  if (sscanf(text, "slice %zu:%n", &slice, &head) == 1 && head > 0 && slice < w->count)
+    batten_fail(w->run.ctx, st, "slice %zu, at the height %.9g:%s", slice, w->heights[slice], text + head);
+}
+
+static batten_status match(loft_work *w, const slices *s) {
   batten_loft_match_options o = w->request->match;
   double start = batten_now();
   o.fit.weights = s->weights;
-  batten_status st = batten_loft_match(w->run.ctx, count, s->starts, s->points, &o, w->contours, &w->match);
+  batten_status st = batten_loft_match(w->run.ctx, w->count, s->starts, s->points, &o, w->contours, &w->match);
+  if (st != BATTEN_OK) tell_height(w, st);
   w->time_match_s = batten_now() - start;
   w->matched = true;
   cli_run_warn(&w->run, st);
-  if (st > 0) w->status = st;
+  if (st > 0 && w->status == BATTEN_OK) w->status = st;
   return st;
 }
 
@@ -144,8 +182,9 @@ static batten_status read_slices(loft_work *w) {
   batten_status st = batten_read_contours(ctx, w->request->common.input, &contours);
   if (st >= 0) st = allocate(w, contours.count);
   if (st >= 0) st = find_places(w, contours.count, contours.planes, &places);
+  if (st >= 0) st = leave_out(w, &contours, places);
   if (st >= 0) st = order_slices(w, &contours, places, &s);
-  if (st >= 0) st = match(w, contours.count, &s);
+  if (st >= 0) st = match(w, &s);
   slices_free(ctx, &s);
   batten_free(ctx, places);
   batten_contours_free(ctx, &contours);

@@ -13,6 +13,7 @@ static void report_match(const loft_work *w, cli_report *r) {
     const char *key;
     size_t value;
   } counts[] = {{"points", m->points},
+                {"slices_left_out", w->left_out},
                 {"slices_reversed", m->reversed},
                 {"slices_told", m->told},
                 {"slices_certified", m->certified},

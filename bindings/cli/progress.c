@@ -116,7 +116,8 @@ static size_t named_input(const char *own, const char *input) {
 static bool about_input(const char *own) {
   static const char *const words[] = {"points",        "matrix",   "seeds",      "problem",        "edge",
                                       "vert",          "triangle", "mesh",       "opt.parameters", "opt.weights",
-                                      "opt.triangles", "count",    "parameters", "contour"};
+                                      "opt.triangles", "count",    "parameters", "contour",
+                                      "planes",        "slice"};
   for (size_t i = 0; i < sizeof words / sizeof *words; i++)
     if (strncmp(own, words[i], strlen(words[i])) == 0) return true;
   return false;
@@ -134,6 +135,7 @@ static void use_words(char *text, size_t size) {
       {"opt.width, opt.height", "--size"},
       {", or opt.improve larger than 0", ""},
       {"matrix.n: ", ""},
+      {"planes[", "contours["},
       {"the context allows", "allowed are"},
       {"opt.time_limit_s", "--time-limit"},
       {"opt.iteration_limit", "--iterations"},

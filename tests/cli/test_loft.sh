@@ -59,9 +59,15 @@ run 1 "two.txt: contours: the file tells no heights; give points x y z, or --gap
 awk 'BEGIN { for (k = 0; k < 3; k++) { for (i = 0; i < 9; i++) print i, i * i, k % 2; print "" } }' >same.txt
 run 1 "same.txt: contours: 0 and 2 lie in one plane, at the height 0; a loft goes through one contour in each plane" loft same.txt
 run 1 "batten: --degree-z-max: 4; must be 5 .. 9" loft vase.txt --closed --degree-z 4 --degree-z-max 4 --smooth-z 2
+run 1 "vase.txt: contours: the file tells their heights; leave --gap away" loft vase.txt --closed --gap 1
 printf '0 0 0\n1 1 0\n\n0 0 1\n1 1 1\n' >short.txt
-run 1 "slice 0 has fewer than 3 points" loft short.txt
-rm -f plane.txt two.txt same.txt short.txt
+run 1 "short.txt: contours: 0 in the file with 3 points or more; a loft goes through two or more" loft short.txt
+awk 'BEGIN { for (k = 0; k < 3; k++) { for (i = 0; i < 9; i++) print i, k == 1 ? 0 : i * i, 8 - k; print "" } }' >line.txt
+run 1 "line.txt: slice 1, at the height 7: points: all 9 are one point or lie on a line" loft line.txt
+awk 'BEGIN { for (k = 0; k < 3; k++) { for (i = 0; i < 9; i++) print i, i * i + (k == 1 ? i : 0), k + (k == 1 ? i : 0);
+  print "" } }' >turned.txt
+run 1 "turned.txt: contours[1]: turned by" loft turned.txt
+rm -f plane.txt two.txt same.txt short.txt line.txt turned.txt
 nothing_new "after all failures"
 
 # ---- files --------------------------------------------------------------------------------------
@@ -126,6 +132,16 @@ check "and have the same volume to 0.1 %" python3 -c '
 import json
 a, b = (json.load(open(f))["volume"] for f in ("vase.json", "shuffled.json"))
 assert abs(a - b) < 1e-3 * a, (a, b)'
+
+# A table of offsets whose last station has two points.
+awk 'BEGIN { print "station,waterline,half_breadth"; for (k = 0; k < 4; k++) for (i = 0; i <= 8; i++)
+  if (k < 3 || i > 6) print 2 * k "," i / 2 "," (4 - k) * sqrt(i / 8) }' >offsets.csv
+run 0 "offsets.csv: contours: 1 of fewer than 3 points left out, the first at the height 6; the surface does without them" \
+  loft offsets.csv --quiet --report offsets.json -o offsets.step
+is offsets.json status shape
+is offsets.json slices_left_out 1
+is offsets.json contours 3
+is offsets.json certified True
 
 echo "1..$count"
 exit $bad
