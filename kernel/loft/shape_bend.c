@@ -12,6 +12,8 @@ static const double PI = 3.14159265358979323846;
 static const double ROOM = 0.9;
 /* Turns below that (and below what rounding of points does) have no sign. */
 static const double STRAIGHT = 0x1p-33, STRAIGHT_ROUNDING = 0x1p-46;
+/* Of the domain: beside cusps no knots are enough, and polygons would drown in rounding. */
+static const double NARROW = 0x1p-20;
 enum { ROUNDS = 40 };
 
 void shape_knots_free(batten_context *ctx, shape_knots *list) {
@@ -95,7 +97,7 @@ static bool is_good(const loft_contour *c, size_t v, int wanted) {
 
 /* ---- knots --------------------------------------------------------------------------------------- */
 
-/* The middle of the longest interval between the knots of both legs of vertex v. */
+/* The middle of the longest interval between the knots of both legs of vertex v; NaN if that is too short. */
 static double find_middle(const loft_space *s, size_t v) {
   double longest = 0, middle = 0;
   for (size_t k = v + 2; k <= v + s->degree; k++) {
@@ -104,7 +106,7 @@ static double find_middle(const loft_space *s, size_t v) {
     longest = b - a;
     middle = a / 2 + b / 2;
   }
-  return shape_wrap(s, middle);
+  return longest > NARROW ? shape_wrap(s, middle) : NAN;
 }
 
 static batten_status tell(batten_context *ctx, loft_stack *s, size_t i, size_t v) {
@@ -115,18 +117,25 @@ static batten_status tell(batten_context *ctx, loft_stack *s, size_t i, size_t v
   return loft_stack_note(ctx, s, &note);
 }
 
-/* Knots for all vertices that are not as they shall be; told if `last`. */
-static batten_status judge(batten_context *ctx, loft_stack *s, size_t i, const shape_places *places, bool last,
-                           shape_knots *list) {
+/* Knots for all vertices that are not as they shall be; *steep: how many have none. list NULL: all are told. */
+static batten_status judge(batten_context *ctx, loft_stack *s, size_t i, const shape_places *places,
+                           shape_knots *list, size_t *steep) {
   const loft_contour *c = s->contours + i;
   size_t vertices = loft_vertices(&c->space);
   signed char *wanted = batten_alloc_array(ctx, vertices, sizeof *wanted);
   if (!wanted) return BATTEN_E_NOMEM;
   batten_status st = BATTEN_OK;
   find_wanted(c, places, wanted);
+  *steep = 0;
   for (size_t v = 0; v < vertices && st >= 0; v++) {
     if (is_good(c, v, wanted[v])) continue;
-    st = last ? tell(ctx, s, i, v) : shape_knots_add(ctx, list, find_middle(&c->space, v), 1);
+    double middle = list ? find_middle(&c->space, v) : NAN;
+    if (!isnan(middle))
+      st = shape_knots_add(ctx, list, middle, 1);
+    else if (list)
+      ++*steep;
+    else
+      st = tell(ctx, s, i, v);
   }
   batten_free(ctx, wanted);
   return st;
@@ -134,13 +143,15 @@ static batten_status judge(batten_context *ctx, loft_stack *s, size_t i, const s
 
 batten_status shape_bend(batten_context *ctx, loft_stack *s, size_t i, const shape_places *places) {
   shape_knots list = {0};
+  size_t steep = 0;
   batten_status st = BATTEN_OK;
   for (int round = 0; round <= ROUNDS && st >= 0; round++) {
     list.count = 0;
-    st = judge(ctx, s, i, places, round == ROUNDS, &list);
+    st = judge(ctx, s, i, places, round < ROUNDS ? &list : NULL, &steep);
     if (st < 0 || list.count == 0) break;
     st = loft_stack_insert(ctx, s, i, list.count, list.knots, list.folds);
   }
+  if (st >= 0 && steep > 0) st = judge(ctx, s, i, places, NULL, &steep);
   shape_knots_free(ctx, &list);
   return st;
 }

@@ -388,6 +388,26 @@ static void test_loop(batten_context *ctx) {
   for (size_t i = 0; i < 2; i++) batten_curve_free(curves[i]);
 }
 
+/* A cusp, where no knots are enough: it is told, and knots stay so far apart that legs keep digits. */
+static void test_cusp(batten_context *ctx) {
+  const double knots[] = {0, 0, 0, 0, 1, 1, 1, 1}, points[] = {0, 0, 1, 1, 0, 1, 1, 0}, heights[2] = {0, 1};
+  const batten_loft_options opt = batten_loft_options_default();
+  batten_curve *curve = NULL;
+  T_OK(batten_curve_create(ctx, &(batten_curve_form){3, 8, knots, points, 0}, &curve), ctx);
+  loft_stack s = {0};
+  T_OK(prepare(ctx, 2, (batten_curve *[]){curve, curve}, heights, &opt, &s), ctx);
+  const loft_space *space = &s.contours[0].space;
+  double least = 1;
+  for (size_t k = 0; k < space->spans; k++) least = fmin(least, space->breaks[k + 1] - space->breaks[k]);
+  T_CHECK(least >= 0x1p-21 && least < 1e-5, "least span beside a cusp: %g", least);
+  size_t told = 0;
+  for (size_t k = 0; k < s.note_count; k++)
+    told += s.notes[k].remark == BATTEN_LOFT_STEEP && fabs(s.notes[k].t - 0.5) < 1e-5;
+  T_CHECK(told == s.note_count && told >= 2 && has_note(&s, BATTEN_LOFT_STEEP, 1), "told of both: %zu", told);
+  loft_stack_free(ctx, &s);
+  batten_curve_free(curve);
+}
+
 /* Turned, moved, 2^k times as large and high, mirrored: the same knots. */
 static void test_invariance(batten_context *ctx) {
   loft_rule rule = {.kind = LOFT_STACK,
@@ -467,6 +487,7 @@ int main(void) {
   test_inside(ctx);
   test_kinds(ctx);
   test_loop(ctx);
+  test_cusp(ctx);
   test_invariance(ctx);
   test_random(ctx);
   test_wild(ctx);
