@@ -25,8 +25,11 @@ enum { ORDER = BSPLINE_ORDER, DEPTH = 50, STACK = 2 * DEPTH + 8, TREE_STACK = 64
 static const double NEAR = 1e-13;
 /* Parts of this size are not halved any more: tangents that are parallel there are so to rounding. */
 static const double SMALL = 1e-8;
+/* Parts nowhere further apart lie on each other: more than NEAR, since to tell parts apart that are hardly more than
+ * NEAR from each other takes as many pairs as these are flat to the difference. */
+static const double LIE = 1e-12;
 /* Shorter than that parts do not lie on each other but touch. */
-static const double SHORT = 1e-5;
+static const double SHORT = 3e-5;
 /* In spans: places that are the same. */
 static const double SAME = 1e-6;
 /* What directions of parts have to differ by, radians. */
@@ -177,9 +180,7 @@ static const double (*net_of(const search *s, size_t span))[2] {
 
 static void point_at(const search *s, double at, double out[2]) {
   size_t span = at >= (double)s->spans ? s->spans - 1 : (size_t)at;
-  double jet[3][2];
-  jet_at(s->degree, net_of(s, span), at - (double)span, jet);
-  memcpy(out, jet[0], sizeof jet[0]);
+  curve_net_at(s->degree, net_of(s, span), at - (double)span, out);
 }
 
 /* How far two places are from each other along the curve, in spans; and with its ends joined. */
@@ -278,13 +279,10 @@ static double project(unsigned d, const part *p, const double x[2], double *dist
     else
       low = at;
     if (!(next >= low && next <= high)) next = 0.5 * low + 0.5 * high;
-    if (pass == 0 || fabs(next - at) > DBL_EPSILON) {
-      at = next;
-      continue;
-    }
-    break;
+    if (pass > 0 && !(fabs(next - at) > DBL_EPSILON)) break;
+    at = next;
   }
-  jet_at(d, (const double(*)[2])p->net, at, jet);
+  curve_net_at(d, (const double(*)[2])p->net, at, jet[0]);
   *distance = hypot(jet[0][0] - x[0], jet[0][1] - x[1]);
   return at;
 }
@@ -292,29 +290,27 @@ static double project(unsigned d, const part *p, const double x[2], double *dist
 /* Whether narrow parts have a piece in common: where they do. */
 static bool lie_on_each_other(const search *s, const couple *c, crossing *out) {
   unsigned d = s->degree;
-  double low = INFINITY, high = -INFINITY, distance, jet[3][2], ends[2][2], other[2];
-  for (unsigned end = 0; end < 2; end++) {
-    double at = project(d, &c->a, c->b.net[end * d], &distance);
-    if (distance <= NEAR) {
-      low = fmin(low, at);
-      high = fmax(high, at);
-    }
-    project(d, &c->b, c->a.net[end * d], &distance);
-    if (distance <= NEAR) {
-      low = fmin(low, end);
-      high = fmax(high, end);
-    }
+  double low = INFINITY, high = -INFINITY, distance, point[2], ends[2][2], other[2];
+  for (unsigned k = 0; k < 4; k++) {
+    unsigned end = k & 1;
+    double at = k < 2 ? project(d, &c->a, c->b.net[end * d], &distance) : end;
+    if (k >= 2) project(d, &c->b, c->a.net[end * d], &distance);
+    if (distance > LIE) continue;
+    low = fmin(low, at);
+    high = fmax(high, at);
   }
   if (!(low < high)) return false;
   /* More places than two curves of this degree can have in common. */
   unsigned count = d * d + 2;
   for (unsigned k = 0; k <= count; k++) {
     double u = low + (high - low) * k / count;
-    jet_at(d, (const double(*)[2])c->a.net, u, jet);
-    double v = project(d, &c->b, jet[0], &distance);
-    if (distance > NEAR) return false;
-    if (k == 0 || k == count) memcpy(ends[k > 0], jet[0], sizeof jet[0]);
-    if (k == 0 || k == count) other[k > 0] = v;
+    curve_net_at(d, (const double(*)[2])c->a.net, u, point);
+    double v = project(d, &c->b, point, &distance);
+    if (distance > LIE) return false;
+    if (k == 0 || k == count) {
+      memcpy(ends[k > 0], point, sizeof point);
+      other[k > 0] = v;
+    }
     if (k == count / 2) set_place(s, &c->a, u, &c->b, v, out->at);
   }
   if (hypot(ends[1][0] - ends[0][0], ends[1][1] - ends[0][1]) < SHORT) return false;
@@ -469,25 +465,21 @@ static bool meet(const box3 *a, const box3 *b) {
 
 /* Span i with itself and with later ones. */
 static batten_status search_span(search *s, const box_tree *tree, const box3 *boxes, size_t i) {
-  struct {
+  struct range {
     size_t node, from, to;
   } stack[TREE_STACK] = {{0, 0, tree->count}};
   batten_status st = search_pair(s, i, i);
   for (size_t height = 1; height > 0 && st >= 0;) {
-    size_t node = stack[--height].node, from = stack[height].from, to = stack[height].to;
-    if (!meet(&tree->boxes[node], &boxes[i])) continue;
-    if (to - from == 1) {
-      size_t j = tree->order[from];
+    struct range r = stack[--height];
+    if (!meet(&tree->boxes[r.node], &boxes[i])) continue;
+    if (r.to - r.from == 1) {
+      size_t j = tree->order[r.from];
       if (j > i) st = search_pair(s, i, j);
       continue;
     }
-    size_t mid = (from + to) / 2;
-    stack[height].node = node + 2 * (mid - from);
-    stack[height].from = mid;
-    stack[height++].to = to;
-    stack[height].node = node + 1;
-    stack[height].from = from;
-    stack[height++].to = mid;
+    size_t mid = (r.from + r.to) / 2;
+    stack[height++] = (struct range){r.node + 2 * (mid - r.from), mid, r.to};
+    stack[height++] = (struct range){r.node + 1, r.from, mid};
   }
   return st;
 }
@@ -527,14 +519,19 @@ static batten_status search_all(search *s) {
 
 /* ---- the result ----------------------------------------------------------------------------------- */
 
+static int compare_places(const void *left, const void *right) {
+  const double *a = left, *b = right;
+  for (int k = 0; k < 2; k++)
+    if (a[k] != b[k]) return a[k] < b[k] ? -1 : 1;
+  return 0;
+}
+
 /* Sorted: surer ones first, then by place, so that what is kept of the same does not depend on the way there. */
 static int compare(const void *left, const void *right) {
   const crossing *a = left, *b = right;
   if (a->lies != b->lies) return a->lies ? -1 : 1;
   if (a->touch != b->touch) return a->touch ? 1 : -1;
-  for (int k = 0; k < 2; k++)
-    if (a->at[k] != b->at[k]) return a->at[k] < b->at[k] ? -1 : 1;
-  return 0;
+  return compare_places(a->at, b->at);
 }
 
 /* Whether c, found after the first `count`, tells nothing new. */
@@ -553,13 +550,6 @@ static double parameter_of(const search *s, double at) {
   return curve_span_at(&s->curve->space, s->span[span], at - (double)span);
 }
 
-static int compare_parameters(const void *left, const void *right) {
-  const double *a = left, *b = right;
-  for (int k = 0; k < 2; k++)
-    if (a[k] != b[k]) return a[k] < b[k] ? -1 : 1;
-  return 0;
-}
-
 static batten_status report(search *s, size_t *count, double (**parameters)[2]) {
   size_t kept = 0;
   if (s->count) qsort(s->found, s->count, sizeof *s->found, compare);
@@ -575,7 +565,7 @@ static batten_status report(search *s, size_t *count, double (**parameters)[2]) 
     out[k][0] = fmin(a, b);
     out[k][1] = fmax(a, b);
   }
-  if (kept) qsort(out, kept, sizeof *out, compare_parameters);
+  if (kept) qsort(out, kept, sizeof *out, compare_places);
   *count = kept;
   *parameters = out;
   return BATTEN_OK;

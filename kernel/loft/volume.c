@@ -89,6 +89,7 @@ static void add_patch(const batten_loft *loft, size_t i, const double origin[2],
 }
 
 batten_status batten_loft_measure(batten_context *ctx, const batten_loft *loft, batten_loft_measures *out) {
+  if (!ctx) return BATTEN_E_INVALID;
   if (!loft || !out)
     return batten_fail(ctx, BATTEN_E_INVALID, "%s: NULL; give a loft and a place for its measures",
                        loft ? "out" : "loft");

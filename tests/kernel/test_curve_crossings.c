@@ -219,6 +219,17 @@ static void test_nearly_touching(batten_context *ctx) {
     }
 }
 
+/* An arc twice, hardly further apart than what counts as common: no pairs without end. */
+static void test_hardly_apart(batten_context *ctx) {
+  for (int k = 0; k <= 4; k++) {
+    double gap = 3e-13 * k, at[MOST][2];
+    curve_case c =
+        pieces(2, 3, (const double[][2]){{0, 0}, {1, 1}, {2, 0}, {1, -3}, {0, gap}, {1, 1 + gap}, {2, gap}}, 0);
+    size_t count = find(ctx, &c, at);
+    T_CHECK(count == 1 && fabs(at[0][0] - 0.5) < 0.01 && fabs(at[0][1] - 2.5) < 0.01, "%g apart: %zu", gap, count);
+  }
+}
+
 static batten_status call(batten_context *ctx, void *arg) {
   const curve_case *c = arg;
   batten_curve_form form = curve_case_form(c);
@@ -260,6 +271,7 @@ int main(void) {
   test_by_hand(ctx);
   test_random(ctx);
   test_nearly_touching(ctx);
+  test_hardly_apart(ctx);
   test_many(ctx);
   uint64_t state = 2;
   curve_case c = curve_case_random(&state, 3, 40, 1, 0, 0, 1);

@@ -182,6 +182,7 @@ static void by_hand(batten_context *ctx) {
   T_RATIO(fabs(m.area - area.area) / area.area, 1e-9, "area %g", m.area);
   T_CHECK(isnan(m.volume), "open: no volume");
   T_STATUS(batten_loft_measure(ctx, loft, NULL), BATTEN_E_INVALID, ctx, "out: NULL");
+  T_CHECK(batten_loft_measure(NULL, loft, &m) == BATTEN_E_INVALID, "no context");
   for (size_t k = 0; k < 12; k++) control[2 * k + 1] = 0;
   batten_loft *wall = NULL;
   T_OK(loft_make(ctx, &stack, &net, heights, control, &wall), ctx);
