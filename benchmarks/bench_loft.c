@@ -4,9 +4,11 @@
  * 0. The paper's example: four open quadratic contours at equal distances, degree (2, 3).
  * 1. Random stacks: degrees 2 to 5, C^1 and C^2, 3 to 12 contours of 4 to 30 knots, spans over two powers of ten,
  *    turned and moved, open and closed, with and without inflections: what is proven and what that took.
- * 2. Growth: 4 to 200 contours of 60 spans, 8 to 200 spans in 20 contours, closed and cubic, all on the same knots
- * and each on its own; times of the parts, one thread; the last column is the time over contours x spans. CSV lines
- * start with "csv,". */
+ * 2. Growth with contours and with spans, cubic, for four families: closed convex contours on the same knots and each
+ *    on its own, and two with inflections that have much to put right. A series ends after a loft that took
+ *    SECONDS_MOST; its exponent is the slope of least squares through logarithms.
+ *
+ * One thread of batten's own; OPENBLAS_NUM_THREADS=1 for BLAS. */
 #include <batten/batten.h>
 #include <batten/loft.h>
 #include <stdio.h>
@@ -58,12 +60,13 @@ static void run_paper(batten_context *ctx) {
     printf("%s\n", batten_error(ctx));
     return;
   }
-  printf("degree (%u, %u), asked for (2, 3); %zu unknowns; %zu inequalities, %zu handed on; %u rounds; %.1f ms\n",
-         f->degree_t, f->degree_z, f->unknowns, f->rows, f->rows_used, f->rounds, 1e3 * r.seconds);
-  printf("wrong signs without inequalities: %zu of %zu pairs; with them: %zu; proven: %s, margin %.3g\n",
-         f->sign_violations_unconstrained, f->sign_pairs, f->sign_violations, f->certified ? "yes" : "no",
-         f->margin_min);
-  printf("objective %.6g, without inequalities %.6g\n", f->objective, f->objective_unconstrained);
+  printf(
+      "| degree | unknowns | inequalities | handed on | rounds | time, ms | wrong signs without | with | of pairs | "
+      "proven | margin | objective without | with |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
+  printf("| (%u, %u) | %zu | %zu | %zu | %u | %.2f | %zu | %zu | %zu | %s | %.3g | %.6g | %.6g |\n", f->degree_t,
+         f->degree_z, f->unknowns, f->rows, f->rows_used, f->rounds, 1e3 * r.seconds,
+         f->sign_violations_unconstrained, f->sign_violations, f->sign_pairs, f->certified ? "yes" : "no",
+         f->margin_min, f->objective_unconstrained, f->objective);
 }
 
 /* ---- random stacks ------------------------------------------------------------------------------- */
@@ -71,55 +74,60 @@ static void run_paper(batten_context *ctx) {
 enum { MEASURES = 5 };
 
 typedef struct tally {
-  size_t tried, failed, proven, elastic, proven_feasible, wrong_free, wrong, raised[10], inserted, pairs, free_pairs;
-  size_t wrong_pairs_free, wrong_pairs;
-  size_t done;
+  size_t tried, failed, done, proven, elastic, elastic_proven, in_need, in_need_proven, raised, inserted;
+  size_t pairs, pairs_free, wrong_pairs_free, wrong_pairs;
+  uint64_t slowest;
   double *values[MEASURES];
 } tally;
 
-static void count_outcome(tally *t, const outcome *r, uint64_t seed, const loft_rule *rule) {
+static void count_outcome(tally *t, const outcome *r, uint64_t seed) {
   const batten_loft_info *f = &r->info;
-  bool elastic = f->vertices_elastic > 0;
+  bool elastic = f->vertices_elastic > 0, in_need = f->sign_violations_unconstrained > 0;
   t->proven += f->certified != 0;
   t->elastic += elastic;
-  t->proven_feasible += f->certified && !elastic;
-  t->wrong_free += f->sign_violations_unconstrained > 0;
-  t->wrong += f->sign_violations > 0;
+  t->elastic_proven += elastic && f->certified;
+  t->in_need += in_need;
+  t->in_need_proven += in_need && f->certified;
+  t->raised += f->degree_raised > 0;
+  t->inserted += f->knots_inserted > 0;
   t->wrong_pairs_free += f->sign_violations_unconstrained;
   t->wrong_pairs += f->sign_violations;
   t->pairs += f->sign_pairs;
-  t->free_pairs += f->sign_pairs_free;
-  t->raised[f->degree_raised < 9 ? f->degree_raised : 9]++;
-  t->inserted += f->knots_inserted > 0;
+  t->pairs_free += f->sign_pairs_free;
   const double values[MEASURES] = {f->interpolation_error, f->continuity_error,
                                    f->objective_unconstrained > 0 ? f->objective / f->objective_unconstrained : 1,
-                                   r->seconds, (double)f->rows};
+                                   r->seconds, (double)f->rows_used};
   for (int k = 0; k < MEASURES; k++) t->values[k][t->done] = values[k];
+  double most = 0;
+  for (size_t i = 0; i < t->done; i++) most = fmax(most, t->values[3][i]);
+  if (r->seconds > most) t->slowest = seed;
   t->done++;
-  printf("csv,random,%zu,%u,%u,%d,%zu,%zu,%s,%u,%u,%zu,%zu,%zu,%zu,%zu,%d,%zu,%.3g,%.3g,%.6g,%.6g,%.4f\n",
-         (size_t)seed, rule->degree, rule->smoothness, rule->closed, rule->contours, rule->inflections,
-         batten_status_name(r->status), f->degree_z, f->degree_raised, f->knots_inserted, f->sign_pairs,
-         f->sign_pairs_free, f->sign_violations_unconstrained, f->sign_violations, f->certified, f->vertices_elastic,
-         f->interpolation_error, f->continuity_error, f->objective, f->objective_unconstrained, r->seconds);
 }
 
 static void print_tally(tally *t) {
   static const char *const names[MEASURES] = {"interpolation error / size", "continuity error / size",
-                                              "objective / without inequalities", "seconds", "inequalities"};
+                                              "objective / without inequalities", "seconds",
+                                              "inequalities handed on"};
   static const double at[6] = {0, 0.1, 0.5, 0.9, 0.99, 1};
-  printf("\nproven %zu of %zu; without elastic vertices %zu, of these proven %zu; failed %zu\n", t->proven, t->tried,
-         t->done - t->elastic, t->proven_feasible, t->failed);
+  printf("\n| | stacks |\n|---|---|\n| tried | %zu |\n| failed | %zu |\n| proven | %zu |\n", t->tried, t->failed,
+         t->proven);
+  printf("| with wrong signs without inequalities | %zu |\n| of them proven | %zu |\n", t->in_need,
+         t->in_need_proven);
+  printf("| with vertices that gave way | %zu |\n| of them proven all the same | %zu |\n", t->elastic,
+         t->elastic_proven);
+  printf("| of a higher degree than asked for | %zu |\n| with knots inserted | %zu |\n", t->raised, t->inserted);
   printf(
-      "stacks with wrong signs: %zu without inequalities, %zu with them; pairs of patch and span: %zu and %zu of "
-      "%zu (%zu others free)\n",
-      t->wrong_free, t->wrong, t->wrong_pairs_free, t->wrong_pairs, t->pairs, t->free_pairs);
-  printf("degree raised by 0, 1, 2, ...:");
-  for (int k = 0; k < 10; k++) printf(" %zu", t->raised[k]);
-  printf("; with inserted knots: %zu\n", t->inserted);
-  printf("\n| | least | 10 %% | median | 90 %% | 99 %% | most |\n|---|---|---|---|---|---|---|\n");
+      "\nPairs of patch and span: %zu, of which %zu have wrong signs without inequalities and %zu with them; %zu "
+      "others are free. The slowest stack is %zu.\n",
+      t->pairs, t->wrong_pairs_free, t->wrong_pairs, t->pairs_free, (size_t)t->slowest);
+  double sum = 0;
+  for (size_t i = 0; i < t->done; i++) sum += t->values[3][i];
+  printf(
+      "All together: %.1f s.\n\n| | least | 10 %% | median | 90 %% | 99 %% | most |\n|---|---|---|---|---|---|---|\n",
+      sum);
   for (int k = 0; k < MEASURES; k++) {
     printf("| %s |", names[k]);
-    for (int q = 0; q < 6; q++) printf(" %.4g |", quantile(t->done, t->values[k], at[q]));
+    for (int q = 0; q < 6; q++) printf(" %.3g |", quantile(t->done, t->values[k], at[q]));
     printf("\n");
   }
 }
@@ -131,12 +139,13 @@ static void run_random(batten_context *ctx, size_t cases) {
   for (uint64_t seed = 0; seed < cases; seed++) {
     loft_rule rule = loft_rule_random(seed);
     outcome r = run(ctx, &rule, NULL);
-    if (r.status < 0) {
-      printf("stack %zu: %s %s\n", (size_t)seed, batten_status_name(r.status), batten_error(ctx));
+    if (r.status != BATTEN_OK)
+      printf("Stack %zu (degree %u, C^%u, %s): %s, %s\n\n", (size_t)seed, rule.degree, rule.smoothness,
+             rule.closed ? "closed" : "open", batten_status_name(r.status), batten_error(ctx));
+    if (r.status < 0)
       t.failed++;
-    } else {
-      count_outcome(&t, &r, seed, &rule);
-    }
+    else
+      count_outcome(&t, &r, seed);
     fflush(stdout);
   }
   print_tally(&t);
@@ -145,42 +154,70 @@ static void run_random(batten_context *ctx, size_t cases) {
 
 /* ---- growth -------------------------------------------------------------------------------------- */
 
-static void run_size(batten_context *ctx, size_t contours, size_t spans, double decades) {
-  loft_rule rule = {.degree = 3,
-                    .smoothness = 2,
-                    .closed = true,
-                    .contours = contours,
-                    .spans = spans,
-                    .rotation = 0.2,
-                    .seed = 11};
+static const double SECONDS_MOST = 20;
+
+typedef struct family {
+  const char *name;
+  loft_rule rule;
+} family;
+
+static const family families[] = {
+    {"closed, convex, all on the same knots", {.closed = true, .rotation = 0.2}},
+    {"closed, convex, each on its own knots over one power of ten", {.closed = true, .rotation = 0.2, .decades = 1}},
+    {"open, two inflections, own knots over one power of ten", {.inflections = 2, .rotation = 0.6, .decades = 1}},
+    {"closed, four inflections, own knots over one power of ten",
+     {.closed = true, .inflections = 4, .rotation = 0.6, .decades = 1}}};
+
+/* Seconds; NaN where it failed. */
+static double run_size(batten_context *ctx, const loft_rule *given, size_t contours, size_t spans) {
+  loft_rule rule = *given;
+  rule.degree = 3;
+  rule.smoothness = 2;
+  rule.seed = 11;
+  rule.contours = contours;
+  rule.spans = spans;
   outcome r = run(ctx, &rule, NULL);
   const batten_loft_info *f = &r.info;
   if (r.status < 0) {
-    printf("| %zu | %zu | %s |\n%s\n", contours, spans, batten_status_name(r.status), batten_error(ctx));
-    return;
+    printf("| %zu | %zu | %s: %s |\n", contours, spans, batten_status_name(r.status), batten_error(ctx));
+    return NAN;
   }
-  printf("| %zu | %zu | %zu | %zu | %zu | %.2f | %.2f | %.2f | %.2f | %.2f | %.2f | %zu of %zu | %s | %.3g |\n",
+  printf("| %zu | %zu | %zu | %zu | %zu | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %zu | %zu | %zu | %s | %.3g |\n",
          contours, spans, f->unknowns, f->rows, f->rows_used, r.seconds, f->time_prepare_s, f->time_objective_s,
-         f->time_rows_s, f->time_qp_s, f->time_check_s, f->sign_violations_unconstrained, f->sign_pairs,
-         f->certified ? "yes" : "no", 1e6 * r.seconds / (double)(contours * spans));
-  printf("csv,growth,%zu,%zu,%g,%zu,%zu,%zu,%.6f,%d\n", contours, spans, decades, f->unknowns, f->rows, f->rows_used,
-         r.seconds, f->certified);
+         f->time_rows_s, f->time_qp_s, f->time_check_s, f->sign_violations_unconstrained, f->sign_violations,
+         f->sign_pairs, f->certified ? "yes" : "no", 1e6 * r.seconds / (double)(contours * spans));
   fflush(stdout);
+  return r.seconds;
+}
+
+/* Sizes [count] of contours (spans 60) or of spans (20 contours). */
+static void run_series(batten_context *ctx, const family *f, bool contours, size_t count, const size_t *sizes,
+                       size_t most) {
+  double n = 0, x = 0, y = 0, xx = 0, xy = 0, seconds = 0;
+  printf("\n%s, %s:\n\n", f->name, contours ? "60 spans" : "20 contours");
+  printf(
+      "| contours | spans | unknowns | inequalities | handed on | whole, s | prepare | objective | rows | programs | "
+      "check | wrong without | wrong | of pairs | proven | us per contour and span |\n"
+      "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
+  for (size_t i = 0; i < count && sizes[i] <= most && !(seconds > SECONDS_MOST); i++) {
+    seconds = contours ? run_size(ctx, &f->rule, sizes[i], 60) : run_size(ctx, &f->rule, 20, sizes[i]);
+    if (!(seconds > 0)) continue;
+    double a = log((double)sizes[i]), b = log(seconds);
+    n++, x += a, y += b, xx += a * a, xy += a * b;
+  }
+  if (seconds > SECONDS_MOST) printf("\nThe series ends here: the last one took over %g s.\n", SECONDS_MOST);
+  if (n > 1)
+    printf("\nTime grows as %s to the power %.2f.\n", contours ? "contours" : "spans",
+           (n * xy - x * y) / (n * xx - x * x));
 }
 
 static void run_growth(batten_context *ctx, size_t most_contours, size_t most_spans) {
   static const size_t contours[] = {4, 10, 20, 50, 100, 200}, spans[] = {8, 20, 60, 120, 200};
-  printf(
-      "\n## Growth: closed, cubic, C^2; times in s, the last column in us\n\n| contours | spans | unknowns | "
-      "inequalities | handed on | whole | prepare | objective | rows | programs | check | wrong without | proven | "
-      "per contour and span |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
-  for (size_t i = 0; i < sizeof contours / sizeof *contours; i++)
-    if (contours[i] <= most_contours) run_size(ctx, contours[i], most_spans < 60 ? most_spans : 60, 0);
-  for (size_t i = 0; i < sizeof spans / sizeof *spans; i++)
-    if (spans[i] <= most_spans) run_size(ctx, most_contours < 20 ? most_contours : 20, spans[i], 0);
-  printf("the same, each contour on knots of its own, spans over one power of ten:\n");
-  for (size_t i = 1; i < sizeof contours / sizeof *contours; i += 3)
-    if (contours[i] <= most_contours) run_size(ctx, contours[i], most_spans < 60 ? most_spans : 60, 1);
+  printf("\n## Growth\n");
+  for (size_t k = 0; k < sizeof families / sizeof *families; k++) {
+    run_series(ctx, &families[k], true, sizeof contours / sizeof *contours, contours, most_contours);
+    run_series(ctx, &families[k], false, sizeof spans / sizeof *spans, spans, most_spans);
+  }
 }
 
 int main(int argc, char **argv) {
@@ -188,7 +225,7 @@ int main(int argc, char **argv) {
   size_t contours = argc > 2 ? strtoul(argv[2], NULL, 10) : 200, spans = argc > 3 ? strtoul(argv[3], NULL, 10) : 200;
   batten_context *ctx = NULL;
   if (batten_context_new(NULL, &ctx) < 0) return 1;
-  printf("batten %s, compiler %s, one thread of batten's own\n", batten_version(), __VERSION__);
+  printf("# Lofts\n\nbatten %s, compiler %s, one thread of batten's own\n", batten_version(), __VERSION__);
   run_paper(ctx);
   if (cases) run_random(ctx, cases);
   run_growth(ctx, contours, spans);

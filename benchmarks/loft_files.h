@@ -2,8 +2,8 @@
  *
  * Scene: count, closed, degree, smoothness, then for each contour its height, its number of knots, knots, control
  * points [knots - degree - 1][2].
- * Surface: seconds (median), builds that were timed, 1 where its sections are proven, degrees by u and v, numbers of
- * knots, knots of u and v, control points [n_u][n_v][3], parameters v of the contours. */
+ * Surface: seconds (median), builds that were timed, degrees by u and v, numbers of knots, knots of u and v, control
+ * points [n_u][n_v][3], parameters v of the contours. */
 #ifndef LOFT_FILES_H
 #define LOFT_FILES_H
 
@@ -11,7 +11,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-enum { LOFT_HEAD = 4, LOFT_REPEATS_MAX = 25 };
+enum { LOFT_HEAD = 4, LOFT_SURFACE_HEAD = 6, LOFT_REPEATS_MAX = 25 };
 
 typedef struct loft_contour_file {
   double height;
@@ -36,18 +36,27 @@ static inline void loft_scene_file_free(loft_scene_file *s) {
   free(s->numbers);
 }
 
-static inline bool loft_scene_file_read(const char *path, loft_scene_file *s) {
+/* All of a file's numbers, for free(); NULL where it cannot be read or has fewer than `least`. */
+static inline double *loft_file_read(const char *path, size_t least, size_t *size) {
   FILE *file = fopen(path, "rb");
   long bytes = -1;
-  *s = (loft_scene_file){.count = 0};
-  if (!file) return false;
+  if (!file) return NULL;
   if (fseek(file, 0, SEEK_END) == 0) bytes = ftell(file);
-  size_t size = bytes > 0 ? (size_t)bytes / sizeof(double) : 0;
-  s->numbers = calloc(size + 1, sizeof(double));
-  bool good = s->numbers && size >= LOFT_HEAD && fseek(file, 0, SEEK_SET) == 0 &&
-              fread(s->numbers, sizeof(double), size, file) == size;
+  *size = bytes > 0 ? (size_t)bytes / sizeof(double) : 0;
+  double *numbers = calloc(*size + 1, sizeof(double));
+  bool good = numbers && *size >= least && fseek(file, 0, SEEK_SET) == 0 &&
+              fread(numbers, sizeof(double), *size, file) == *size;
   fclose(file);
-  if (!good) return false;
+  if (good) return numbers;
+  free(numbers);
+  return NULL;
+}
+
+static inline bool loft_scene_file_read(const char *path, loft_scene_file *s) {
+  size_t size;
+  *s = (loft_scene_file){.count = 0};
+  s->numbers = loft_file_read(path, LOFT_HEAD, &size);
+  if (!s->numbers) return false;
   s->count = (size_t)s->numbers[0];
   s->closed = s->numbers[1] > 0;
   s->degree = (unsigned)s->numbers[2];
@@ -74,7 +83,6 @@ static inline int loft_by_value(const void *a, const void *b) {
 typedef struct loft_surface_file {
   double seconds;
   size_t builds;
-  bool proven;
   unsigned degree[2];
   size_t knot_count[2];
   const double *knots[2], *points;
@@ -83,16 +91,12 @@ typedef struct loft_surface_file {
 } loft_surface_file;
 
 static inline bool loft_surface_file_write(const char *path, const loft_surface_file *s) {
-  double head[7] = {s->seconds,
-                    (double)s->builds,
-                    s->proven,
-                    s->degree[0],
-                    s->degree[1],
-                    (double)s->knot_count[0],
-                    (double)s->knot_count[1]};
+  double head[LOFT_SURFACE_HEAD] = {s->seconds,   (double)s->builds,        s->degree[0],
+                                    s->degree[1], (double)s->knot_count[0], (double)s->knot_count[1]};
   size_t points = (s->knot_count[0] - s->degree[0] - 1) * (s->knot_count[1] - s->degree[1] - 1);
   FILE *file = fopen(path, "wb");
-  bool good = file && loft_numbers(file, head, 7) && loft_numbers(file, s->knots[0], s->knot_count[0]) &&
+  bool good = file && loft_numbers(file, head, LOFT_SURFACE_HEAD) &&
+              loft_numbers(file, s->knots[0], s->knot_count[0]) &&
               loft_numbers(file, s->knots[1], s->knot_count[1]) && loft_numbers(file, s->points, 3 * points) &&
               loft_numbers(file, s->parameters, s->count);
   if (file && fclose(file) != 0) good = false;

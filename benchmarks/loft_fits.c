@@ -4,6 +4,8 @@
  *   loft-fits fit WAY SCENE SURFACE SECONDS     WAY: loft (as by default), cubic (C^1 and of degree 3 across the
  *                                               contours, raised where need be), free (the same without inequalities,
  *                                               in the time of both); repeats for so many seconds
+ *   loft-fits prove SURFACE                     of whomsoever: prints the span pairs of which a sign is wanted, since
+ *                                               both end sections have it, those with a wrong sign, those unproven
  *
  * Files as in loft_files.h. */
 #include <batten/loft.h>
@@ -80,7 +82,7 @@ static batten_status make_contours(batten_context *ctx, const loft_scene_file *s
   return st;
 }
 
-static bool write_loft(batten_context *ctx, const batten_loft *loft, double seconds, size_t builds, bool proven,
+static bool write_loft(batten_context *ctx, const batten_loft *loft, double seconds, size_t builds,
                        const char *path) {
   batten_surface *surface = NULL;
   if (batten_loft_surface(ctx, loft, &surface) < 0) return false;
@@ -88,7 +90,6 @@ static bool write_loft(batten_context *ctx, const batten_loft *loft, double seco
   batten_loft_form own = batten_loft_get(loft);
   loft_surface_file out = {.seconds = seconds,
                            .builds = builds,
-                           .proven = proven,
                            .degree = {f.degree[0], f.degree[1]},
                            .knot_count = {f.knot_count[0], f.knot_count[1]},
                            .knots = {f.knots[0], f.knots[1]},
@@ -131,8 +132,7 @@ static int fit(batten_context *ctx, const char *way, const char *scene, const ch
     fail(way, batten_error(ctx));
   } else {
     qsort(times, builds, sizeof *times, loft_by_value);
-    good =
-        write_loft(ctx, is_free ? unconstrained : loft, times[builds / 2], builds, !is_free && info.certified, path);
+    good = write_loft(ctx, is_free ? unconstrained : loft, times[builds / 2], builds, path);
     if (st > 0) fprintf(stderr, "%s\n", batten_error(ctx));
   }
   batten_loft_free(loft);
@@ -142,6 +142,27 @@ static int fit(batten_context *ctx, const char *way, const char *scene, const ch
   free(heights);
   loft_scene_file_free(&s);
   return good ? 0 : 1;
+}
+
+/* ---- proof ---- */
+
+static int prove(batten_context *ctx, const char *path) {
+  size_t size;
+  double *numbers = loft_file_read(path, LOFT_SURFACE_HEAD, &size);
+  if (!numbers) return fail(path, "is no surface");
+  batten_surface_form f = {.degree = {(unsigned)numbers[2], (unsigned)numbers[3]},
+                           .knot_count = {(size_t)numbers[4], (size_t)numbers[5]}};
+  f.knots[0] = numbers + LOFT_SURFACE_HEAD;
+  f.knots[1] = f.knots[0] + f.knot_count[0];
+  f.control_points = f.knots[1] + f.knot_count[1];
+  batten_surface *surface = NULL;
+  batten_sections found;
+  batten_status st = batten_surface_create(ctx, &f, &surface);
+  if (st >= 0) st = batten_surface_certify_sections(ctx, surface, NULL, &found, NULL);
+  if (st >= 0) printf("%zu %zu %zu\n", found.pairs, found.violations, found.unproven);
+  batten_surface_free(surface);
+  free(numbers);
+  return st >= 0 ? 0 : fail(path, batten_error(ctx));
 }
 
 int main(int argc, char **argv) {
@@ -154,8 +175,10 @@ int main(int argc, char **argv) {
       result = write_scene(ctx, argv[2], &scene_rules[i]);
   } else if (argc == 6 && strcmp(argv[1], "fit") == 0) {
     result = fit(ctx, argv[2], argv[3], argv[4], strtod(argv[5], NULL));
+  } else if (argc == 3 && strcmp(argv[1], "prove") == 0) {
+    result = prove(ctx, argv[2]);
   } else {
-    fail("loft-fits", "scenes FOLDER, or fit WAY SCENE SURFACE SECONDS");
+    fail("loft-fits", "scenes FOLDER, fit WAY SCENE SURFACE SECONDS, or prove SURFACE");
   }
   batten_context_free(ctx);
   return result;
