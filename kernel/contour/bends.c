@@ -486,31 +486,37 @@ static double rougher(const search *s) {
   return more <= 1 ? 1 : fmin(more * more, fmax(many * many, ROUGH_LEAST));
 }
 
+static batten_status take_bends(batten_context *ctx, search *s, contour_bends *b) {
+  if (s->left > 1) {
+    b->inflections = batten_alloc_array(ctx, s->left, sizeof *b->inflections);
+    b->uncertainties = batten_alloc_array(ctx, s->left, sizeof *b->uncertainties);
+    if (!b->inflections || !b->uncertainties) return BATTEN_E_NOMEM;
+  }
+  conclude(s, b);
+  return BATTEN_OK;
+}
+
 batten_status contour_bends_find(batten_context *ctx, const contour_smooth *smooth, const contour_plot *plot,
-                                 size_t points, const double *parameters, double significance, contour_bends *out) {
+                                 size_t points, const double *parameters, size_t count, const double *significances,
+                                 contour_bends *out) {
   search s = {.smooth = smooth, .plot = plot, .points = points, .parameters = parameters};
-  contour_bends b = {0};
   s.noise = fmax(smooth->noise, CONTOUR_EVEN * smooth->size * sqrt(fmax(1, smooth->count / CONTOUR_EVEN_COUNT)));
+  for (size_t k = 0; k < count; k++) out[k] = (contour_bends){0};
   batten_status st = find_runs(ctx, &s);
   if (st >= 0) {
     join_noise(&s);
     st = contour_forced_new(ctx, smooth, smooth->lambda * rougher(&s), &s.forced);
   }
-  if (st >= 0) st = join_insignificant(ctx, &s, significance);
-  if (st >= 0 && s.left > 1) {
-    b.inflections = batten_alloc_array(ctx, s.left, sizeof *b.inflections);
-    b.uncertainties = b.inflections ? batten_alloc_array(ctx, s.left, sizeof *b.uncertainties) : NULL;
-    if (!b.uncertainties) st = BATTEN_E_NOMEM;
+  for (size_t k = 0; k < count && st >= 0; k++) {
+    st = join_insignificant(ctx, &s, significances[k]);
+    if (st >= 0) st = take_bends(ctx, &s, out + k);
   }
   if (st >= 0) {
-    conclude(&s, &b);
-    b.run_count = s.count;
-    b.runs = s.runs;
+    out[count - 1].run_count = s.count;
+    out[count - 1].runs = s.runs;
     s.runs = NULL;
-    *out = b;
-    b = (contour_bends){0};
   }
-  contour_bends_free(ctx, &b);
+  for (size_t k = 0; k < count && st < 0; k++) contour_bends_free(ctx, out + k);
   contour_forced_free(ctx, &s.forced);
   batten_free(ctx, s.groups);
   batten_free(ctx, s.runs);

@@ -20,9 +20,12 @@ typedef struct contour_bends {
   double *inflections, *uncertainties; /* [count] */
   int sign;                            /* at the start */
 } contour_bends;
-/* parameters [points] are for telling how many points speak for a run. Fails: NOMEM, CANCELLED. */
+/* What counts at each of `count` significances, which ascend: each out [count] has some of the inflections of the one
+ * before; the last one has the runs. parameters [points] are for telling how many points speak for a run. Fails:
+ * NOMEM, CANCELLED. */
 batten_status contour_bends_find(batten_context *ctx, const contour_smooth *s, const contour_plot *plot,
-                                 size_t points, const double *parameters, double significance, contour_bends *out);
+                                 size_t points, const double *parameters, size_t count, const double *significances,
+                                 contour_bends *out);
 void contour_bends_free(batten_context *ctx, contour_bends *b);
 
 /* No noise is taken for less than this part of the points' size where there are as many points as this; where they

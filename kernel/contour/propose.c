@@ -23,7 +23,7 @@ batten_status contour_inflections_find(batten_context *ctx, const contour_data *
   contour_plot plot = {0};
   contour_bends bends = {0};
   batten_status st = smooth_and_plot(ctx, data, parameters, closed, &smooth, &plot);
-  if (st >= 0) st = contour_bends_find(ctx, &smooth, &plot, data->count, parameters, significance, &bends);
+  if (st >= 0) st = contour_bends_find(ctx, &smooth, &plot, data->count, parameters, 1, &significance, &bends);
   if (st >= 0) {
     *count = bends.count;
     *inflections = bends.inflections;
@@ -167,7 +167,7 @@ batten_status batten_contour_propose(batten_context *ctx, size_t count, const do
   contour_bends bends = {0};
   batten_curve *curve = NULL;
   st = smooth_and_plot(ctx, &data, in.parameters, closed, &smooth, &plot);
-  if (st >= 0) st = contour_bends_find(ctx, &smooth, &plot, in.count, in.parameters, o.significance, &bends);
+  if (st >= 0) st = contour_bends_find(ctx, &smooth, &plot, in.count, in.parameters, 1, &o.significance, &bends);
   if (st >= 0) st = make_curve(ctx, &smooth, &in, &curve);
   if (st >= 0) {
     batten_status go = batten_progress(ctx, "inflections", 1);

@@ -208,6 +208,49 @@ static void test_passing(batten_context *ctx) {
   drop(&o);
 }
 
+/* A ring with noise, and a dent at 3. */
+static void noisy_dent(double depth, double points[][2]) {
+  uint64_t seed = 23;
+  for (size_t k = 0; k < POINTS; k++) {
+    double a = 2 * PI * (double)k / POINTS, r = 1 - depth * exp(-pow((a - 3) / 0.5, 2));
+    points[k][0] = r * cos(a) + 0.02 * (t_uniform(&seed) - 0.5);
+    points[k][1] = r * sin(a) + 0.02 * (t_uniform(&seed) - 0.5);
+  }
+}
+
+/* Slice 3 of 7 has a dent of another depth. One of 0.18 has about 3 standard deviations, 0.22 about 7, and 0.35 above
+ * 16. */
+static outcome faint(batten_context *ctx, double depth, double others, int features) {
+  scene s = new_scene(true);
+  double points[POINTS][2];
+  for (size_t i = 0; i < 7; i++) {
+    noisy_dent(i == 3 ? depth : others, points);
+    add_slice(&s, POINTS, points, false);
+  }
+  s.opt.features = features;
+  return match(ctx, &s);
+}
+
+/* Neighbours let bends count that one slice does not tell of clearly. */
+static void test_faint(batten_context *ctx) {
+  outcome o = faint(ctx, 0.18, 0.35, 0);
+  T_CHECK(o.st >= 0 && o.info.inflections == 12, "a faint dent alone does not count");
+  drop(&o);
+  o = faint(ctx, 0.18, 0.35, 1);
+  T_CHECK(o.st == BATTEN_OK && o.info.inflections_matched == 14 && o.info.inflections == 14 && o.info.certified == 7,
+          "a faint dent that neighbours have counts: %zu of %zu matched", o.info.inflections_matched,
+          o.info.inflections);
+  drop(&o);
+  o = faint(ctx, 0.22, 0, 1);
+  T_CHECK(o.st == BATTEN_OK && o.info.inflections == 2 && o.info.inflections_matched == 0,
+          "a dent that counts alone does so without neighbours");
+  drop(&o);
+  o = faint(ctx, 0, 0.35, 1);
+  T_CHECK(o.st >= 0 && o.info.inflections == 12 && o.info.inflections_matched == 8,
+          "where there is no dent, neighbours do not make one");
+  drop(&o);
+}
+
 /* ---- options ------------------------------------------------------------------------------------- */
 
 static void test_options(batten_context *ctx) {
@@ -346,6 +389,7 @@ int main(void) {
   test_dents(ctx);
   test_frames(ctx);
   test_passing(ctx);
+  test_faint(ctx);
   test_options(ctx);
   test_weights(ctx);
   test_invariance(ctx);

@@ -165,7 +165,8 @@ typedef struct batten_loft_match_options {
                                  more tension, up to 1e-4, so that they stay calm on the knots of others. */
   int orient;                 /* non-zero: slices that run against the first one are reversed. Default 1. */
   int align;                  /* non-zero, closed slices: begin where neighbours begin. Default 1. */
-  int features; /* non-zero: inflections of neighbours that belong together get one parameter. Default 1. */
+  int features; /* non-zero: inflections of neighbours that belong together get one parameter; bends count
+                   from half of fit.significance on where that gives more inflections partners. Default 1. */
 } batten_loft_match_options;
 BATTEN_API batten_loft_match_options batten_loft_match_options_default(void);
 
