@@ -65,8 +65,8 @@ typedef struct batten_loft_info {
   size_t rows_used;           /* of them handed to the solver: others hold by themselves */
   unsigned rounds;            /* of quadratic programs, all degrees and knots together */
   size_t iterations;          /* of their solver */
-  double interpolation_error; /* largest distance of the surface from the contours (after merging of knots), over the
-                                 size of the contours' box */
+  double interpolation_error; /* largest distance of the surface from the contours as given (knot_shift included),
+                                 over the size of the contours' box */
   double continuity_error; /* largest jump of derivatives by z up to the smoothness, k-th ones times the k-th power of
                               the lower patch's height, over that size */
   size_t inflections;      /* of all contours */
