@@ -25,9 +25,10 @@ static void bernstein(unsigned n, double zeta, double *value, double *slope) {
   }
 }
 
-/* One line of nodes t = const of a span: its control points by z, and those of the derivative by t. */
-static void add_line(unsigned n, double gap, unsigned parts, const double (*point)[2], const double (*along)[2],
-                     double weight, sums *out) {
+/* One line of nodes t = const of a span: its control points by z, and those of the derivative by t. Points are
+ * times unit, the area too, of a patch `gap` high; the volume is times unit^2, of one 1 high. */
+static void add_line(unsigned n, double gap, double unit, unsigned parts, const double (*point)[2],
+                     const double (*along)[2], double weight, sums *out) {
   for (unsigned part = 0; part < parts; part++)
     for (unsigned q = 0; q < GAUSS8; q++) {
       double node, share, value[BSPLINE_ORDER], slope[BSPLINE_ORDER], x[2] = {0}, t[2] = {0}, z[2] = {0};
@@ -37,17 +38,35 @@ static void add_line(unsigned n, double gap, unsigned parts, const double (*poin
         for (int c = 0; c < 2; c++) {
           x[c] += value[k] * point[k][c];
           t[c] += value[k] * along[k][c];
-          z[c] += slope[k] * point[k][c] / gap;
+          z[c] += slope[k] * point[k][c];
         }
-      double area = sqrt(t[0] * t[0] + t[1] * t[1] + loft_cross(t, z) * loft_cross(t, z));
-      out->area += weight * share / parts * gap * area;
-      out->volume += weight * share / parts * gap * 0.5 * loft_cross(x, t);
+      out->area += weight * share / parts * hypot(gap * hypot(t[0], t[1]), loft_cross(t, z) / unit);
+      out->volume += weight * share / parts * 0.5 * loft_cross(x, t);
     }
 }
 
-/* A span of a patch. Points relative to origin, so that the volume of what lies far away keeps its digits. */
+/* Points relative to origin, so that the volume of what lies far away keeps its digits; times unit, so that squares
+ * are doubles. */
+typedef struct frame {
+  double origin[2], unit;
+} frame;
+
+static frame frame_of(const batten_loft *loft) {
+  const double *first = loft->patches[0].control;
+  frame f = {.origin = {first[0], first[1]}};
+  double most = 0;
+  for (size_t i = 0; i + 1 < loft->contours; i++) {
+    const loft_patch *p = &loft->patches[i];
+    for (size_t k = 0; k < 2 * p->count * (loft->degree[1] + 1); k++)
+      most = fmax(most, fabs(p->control[k] - f.origin[k % 2]));
+  }
+  f.unit = most > 0 ? batten_unit(most) : 1;
+  return f;
+}
+
+/* A span of a patch. */
 static sums measure_span(const loft_patch *patch, const bspline *b, unsigned n, double gap, size_t mu, unsigned parts,
-                         const double origin[2]) {
+                         const frame *f) {
   unsigned d = b->degree;
   double width = b->knots[mu + 1] - b->knots[mu];
   sums s = {0};
@@ -59,16 +78,17 @@ static sums measure_span(const loft_patch *patch, const bspline *b, unsigned n, 
       for (unsigned j = 0; j <= d; j++)
         for (unsigned k = 0; k <= n; k++)
           for (int c = 0; c < 2; c++) {
-            double at = patch->control[((mu - d + j) * (n + 1) + k) * 2 + (size_t)c] - origin[c];
+            double at = patch->control[((mu - d + j) * (n + 1) + k) * 2 + (size_t)c] - f->origin[c];
+            at *= f->unit;
             point[k][c] += table[j] * at;
-            along[k][c] += table[d + 1 + j] * at;
+            along[k][c] += table[d + 1 + j] * width * at;
           }
-      add_line(n, gap, parts, (const double(*)[2])point, (const double(*)[2])along, share / parts * width, &s);
+      add_line(n, gap, f->unit, parts, (const double(*)[2])point, (const double(*)[2])along, share / parts, &s);
     }
   return s;
 }
 
-static void add_patch(const batten_loft *loft, size_t i, const double origin[2], sums *out) {
+static void add_patch(const batten_loft *loft, size_t i, const frame *f, sums *out) {
   const loft_patch *patch = &loft->patches[i];
   unsigned n = loft->degree[1];
   bspline b = {loft->degree[0], patch->count, patch->knots};
@@ -77,14 +97,14 @@ static void add_patch(const batten_loft *loft, size_t i, const double origin[2],
   unsigned least = 2 * n >= 2 * GAUSS8 || 2 * b.degree > 2 * GAUSS8 ? 2 : 1;
   for (size_t mu = bspline_first(&b); mu < b.count; mu = bspline_next(&b, mu)) {
     unsigned parts = least;
-    sums s = measure_span(patch, &b, n, gap, mu, parts, origin), last;
+    sums s = measure_span(patch, &b, n, gap, mu, parts, f), last;
     do {
       last = s;
       parts *= 2;
-      s = measure_span(patch, &b, n, gap, mu, parts, origin);
+      s = measure_span(patch, &b, n, gap, mu, parts, f);
     } while (parts < PARTS_MAX && fabs(s.area - last.area) > SAME_AREA * s.area);
     out->area += s.area;
-    out->volume += s.volume;
+    out->volume += s.volume * gap;
   }
 }
 
@@ -94,12 +114,12 @@ batten_status batten_loft_measure(batten_context *ctx, const batten_loft *loft, 
     return batten_fail(ctx, BATTEN_E_INVALID, "%s: NULL; give a loft and a place for its measures",
                        loft ? "out" : "loft");
   sums s = {0};
-  const double *origin = loft->patches[0].control;
+  frame f = frame_of(loft);
   for (size_t i = 0; i + 1 < loft->contours; i++) {
     batten_status st = batten_progress(ctx, "measure", (double)i / (double)(loft->contours - 1));
     if (st < 0) return st;
-    add_patch(loft, i, origin, &s);
+    add_patch(loft, i, &f, &s);
   }
-  *out = (batten_loft_measures){.area = s.area, .volume = loft->closed ? s.volume : NAN};
+  *out = (batten_loft_measures){.area = s.area / f.unit, .volume = loft->closed ? s.volume / f.unit / f.unit : NAN};
   return BATTEN_OK;
 }

@@ -189,6 +189,17 @@ static void by_hand(batten_context *ctx) {
   /* With y = 0 a plane wall: x runs from 0 to 1 below and to 2 above without turning, over a height of 3. */
   T_OK(batten_loft_measure(ctx, wall, &m), ctx);
   T_RATIO(fabs(m.area - 4.5), 1e-13, "area of a trapezoid");
+  /* Sizes whose squares are no doubles: the wall next to flat, and next to a line. */
+  for (size_t k = 0; k < 24; k += 2) wall->patches[0].control[k] *= 0x1p-600;
+  wall->heights[1] = wall->heights[0] + 3 * 0x1p600;
+  T_OK(batten_loft_measure(ctx, wall, &m), ctx);
+  T_RATIO(fabs(m.area - 4.5), 1e-13, "a narrow one");
+  for (size_t k = 0; k < 24; k += 2) wall->patches[0].control[k] = ldexp(wall->patches[0].control[k], 1200);
+  for (size_t k = 0; k <= 5; k++) wall->patches[0].knots[k] *= 0x1p-1000;
+  wall->heights[0] = 0;
+  wall->heights[1] = 3 * 0x1p-600;
+  T_OK(batten_loft_measure(ctx, wall, &m), ctx);
+  T_RATIO(fabs(m.area - 4.5), 1e-13, "a low one over a short domain");
   batten_loft_free(wall);
   batten_surface_free(whole);
   batten_surface_free(patch);
