@@ -121,10 +121,11 @@ static batten_status leave_out(loft_work *w, const batten_contours *c, place *pl
     return batten_fail(w->run.ctx, BATTEN_E_INVALID,
                        "contours: %zu in the file with 3 points or more; a loft goes through two or more", kept);
   if (w->left_out == 0) return BATTEN_OK;
-  cli_run_warn(&w->run, batten_fail(w->run.ctx, BATTEN_W_SHAPE,
-                                    "contours: %zu of fewer than 3 points left out, the first at the height %.9g; the "
-                                    "surface does without them",
-                                    w->left_out, first));
+  cli_run_warn(&w->run,
+               batten_fail(w->run.ctx, BATTEN_W_SHAPE,
+                           "contours: %zu of fewer than 3 points left out, the first at the height %.9g; the "
+                           "surface does without them",
+                           w->left_out, first));
   w->status = BATTEN_W_SHAPE;
   return BATTEN_OK;
 }

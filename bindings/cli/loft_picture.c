@@ -17,6 +17,7 @@ enum {
   PLACES_Z = 160,   /* across all of them, about */
   SECTIONS = 42,    /* drawn in all, about */
   SECTIONS_MAX = 7, /* in a patch */
+  CONTOURS = 24,    /* whose lines are drawn, at most: more darken what is between them */
   CURVE_STEPS = 8,  /* of a drawn section in a cell of the grid: none between the grid's columns */
   TEXT = 128
 };
@@ -390,7 +391,7 @@ static batten_status color(batten_context *ctx, drawing *d, size_t sides) {
 
 typedef struct panel {
   batten_picture_lines lines[LINE_KINDS];
-  char title[TEXT], caption[TEXT];
+  char caption[TEXT];
   batten_picture_options options;
 } panel;
 
@@ -401,25 +402,29 @@ static batten_picture_lines kind(const convex_segments *s, unsigned rgb, double 
 /* Stacks of many contours are drawn with finer lines. */
 static double line_share(const drawing *d) {
   double many = (double)d->scene->contour_count;
-  return fmax(0.2, fmin(1, sqrt(16 / many)));
+  return fmax(0.2, fmin(1, 8 / many));
 }
+
+/* The polygons of closed stacks are seen on the surface: front and back together would be a tangle. */
+static bool is_closed(const drawing *d) { return batten_curve_get(d->scene->contours[0]).closed != 0; }
 
 static void describe(const drawing *d, const side *s, unsigned which, const char *name, panel *p) {
   static const char *const titles[PANELS] = {"control polygons", "contours and sections", "Gaussian curvature",
                                              "curvature of sections"};
-  double w = line_share(d);
+  double w = line_share(d), behind = is_closed(d) ? 0.1 : 0.7;
   batten_picture_options *o = &p->options;
   *o = batten_picture_options_default();
   if (which == 0) {
-    p->lines[0] = kind(&s->dots, 0x8f959d, fmax(2, 6 * w), 0.7);
-    p->lines[1] = kind(&s->polygons, 0x24466f, fmax(0.8, 1.5 * w), 0.6);
-    p->lines[2] = p->lines[3] = kind(&d->data, 0x000000, 5 * w, 0.7); /* twice: lines are a little transparent */
+    p->lines[0] = kind(&s->dots, 0x8f959d, fmax(1.6, 6 * w), behind);
+    p->lines[1] = kind(&s->polygons, 0x24466f, fmax(0.8, 1.5 * w), behind);
+    /* twice: lines are a little transparent */
+    p->lines[2] = p->lines[3] = kind(&d->data, 0x000000, fmax(1.6, 5 * w), behind);
   } else if (which == 1) {
-    p->lines[0] = kind(&d->data, 0x7d848d, 2.6 * w, 0.6);
-    p->lines[1] = kind(&s->sections, 0x24466f, fmax(0.8, 1.5 * w), 0.4);
-    p->lines[2] = p->lines[3] = kind(&d->contours, 0x000000, 4 * w, 0.3);
+    p->lines[0] = kind(&d->data, 0x7d848d, fmax(0.8, 2.6 * w), 0.3);
+    p->lines[1] = kind(&s->sections, 0x24466f, fmax(0.8, 1.5 * w), 0.2);
+    p->lines[2] = p->lines[3] = kind(&d->contours, 0x000000, fmax(1.2, 4 * w), 0.15);
   } else {
-    p->lines[0] = kind(&d->contours, 0x000000, 2.4 * w * w, 0.2);
+    p->lines[0] = kind(&d->contours, 0x000000, fmax(0.8, 2.4 * w), 0.1);
     if (which == 3) p->lines[1] = (batten_picture_lines){s->level_count, s->levels, 0xb01010, 2, 0};
     o->colors = s->tones[which - 2];
     o->color_map = BATTEN_MAP_PARTED;
@@ -432,14 +437,14 @@ static void describe(const drawing *d, const side *s, unsigned which, const char
   o->azimuth_deg = d->view->azimuth_deg;
   o->elevation_deg = d->view->elevation_deg;
   o->up_axis = d->view->up_axis;
-  if (which > 0) o->normals = s->normals;
+  if (which > 0 || is_closed(d)) o->normals = s->normals;
   o->both_sides = 1;
-  snprintf(p->title, TEXT, "%s%s%s", titles[which], *name ? ", " : "", name);
-  o->title = p->title;
-  if (d->height_scale != 1) {
-    snprintf(p->caption, TEXT, "heights drawn %g times as large", d->height_scale);
-    o->caption = p->caption;
-  }
+  o->title = titles[which];
+  size_t length = (size_t)snprintf(p->caption, TEXT, "%s", name);
+  if (d->height_scale != 1)
+    snprintf(p->caption + length, TEXT - length, "%sheights drawn %g times as large", length ? ", " : "",
+             d->height_scale);
+  if (*p->caption) o->caption = p->caption;
 }
 
 static batten_status draw(batten_context *ctx, const drawing *d, size_t sides, const char *path) {
@@ -449,9 +454,10 @@ static batten_status draw(batten_context *ctx, const drawing *d, size_t sides, c
   memset(panels, 0, 2 * PANELS * sizeof *panels);
   for (size_t i = 0; i < sides; i++)
     for (unsigned k = 0; k < PANELS; k++) {
+      const side *s = &d->sides[i];
       panel *p = &panels[i * PANELS + k];
-      describe(d, &d->sides[i], k, sides == 1 ? "" : i == 0 ? "without inequalities" : "with inequalities", p);
-      shown[i * PANELS + k] = (batten_picture_panel){k == 0 ? d->sides[i].bare : d->sides[i].mesh, &p->options, 1};
+      describe(d, s, k, sides == 1 ? "" : i == 0 ? "without inequalities" : "with inequalities", p);
+      shown[i * PANELS + k] = (batten_picture_panel){k == 0 && !is_closed(d) ? s->bare : s->mesh, &p->options, 1};
     }
   batten_status st = batten_picture_panels(ctx, 2, sides == 2 ? PANELS : PANELS / 2, shown, d->view, path);
   batten_free(ctx, panels);
@@ -469,7 +475,9 @@ batten_status loft_draw(batten_context *ctx, const loft_scene *scene, const batt
   d.sides[0].patches = scene->unconstrained ? scene->unconstrained : scene->patches;
   d.sides[1].patches = scene->patches;
   batten_status st = BATTEN_OK;
-  for (size_t i = 0; st >= 0 && i < scene->contour_count; i++) st = add_contour(ctx, &d, i);
+  size_t stride = (patches + CONTOURS - 1) / CONTOURS;
+  for (size_t i = 0; st >= 0 && i < scene->contour_count; i++)
+    if (i % stride == 0 || i == patches) st = add_contour(ctx, &d, i);
   for (size_t i = 0; st >= 0 && i < sides; i++) st = gather(ctx, &d, &d.sides[i]);
   if (st >= 0) st = color(ctx, &d, sides);
   if (st >= 0) st = draw(ctx, &d, sides, path);
