@@ -141,18 +141,23 @@ static double agreement(const double *before, const double *own, size_t shift) {
   return sum;
 }
 
-/* The shift of best agreement, between samples by the parabola through the best one and its neighbours; of equal ones
- * that of least way. */
-static double best_shift(const double *before, const double *own) {
-  size_t best = 0;
+/* The most agreement, and the sample of that; of equal ones that of least way. */
+static double most_agreement(const double *before, const double *own, size_t *best) {
   double most = -INFINITY;
   for (size_t k = 0; k < SAMPLES; k++) {
     size_t shift = k % 2 ? SAMPLES - 1 - k / 2 : k / 2; /* 0, -1, 1, -2, ... */
     double value = agreement(before, own, shift);
     if (value <= most) continue;
     most = value;
-    best = shift;
+    *best = shift;
   }
+  return most;
+}
+
+/* The shift of best agreement, between samples by the parabola through the best one and its neighbours. */
+static double best_shift(const double *before, const double *own) {
+  size_t best = 0;
+  double most = most_agreement(before, own, &best);
   double left = agreement(before, own, (best + SAMPLES - 1) % SAMPLES),
          right = agreement(before, own, (best + 1) % SAMPLES), bend = left - 2 * most + right;
   double step = bend < 0 ? 0.5 * (left - right) / bend : 0;
@@ -172,6 +177,20 @@ static void rotate_slice(match_slice *s, double start, size_t *room) {
   for (size_t i = 0; i < n; i++) s->lengths[i] = fmin(1, s->parameters[i]);
 }
 
+/* Whether a closed slice runs against the one before. That is what areas tell, but lines that cross themselves may
+ * have hardly any: then it is the direction that agrees, where one does clearly. */
+static bool turns_against(const double *before, double area_before, double *own, double area) {
+  static const double FULL = 0.1, CLEAR = 0.1;
+  size_t shift;
+  bool full = fmin(fabs(area), fabs(area_before)) > FULL; /* of a circle: pi */
+  double forward = full ? 0 : most_agreement(before, own, &shift);
+  reverse_samples(true, own);
+  double backward = full ? 0 : most_agreement(before, own, &shift);
+  reverse_samples(true, own);
+  if (fabs(forward - backward) > CLEAR * fmax(forward, backward)) return backward > forward;
+  return area * area_before < 0;
+}
+
 /* ---- all slices --------------------------------------------------------------------------------- */
 
 static batten_status measure(batten_context *ctx, size_t i, bool closed, match_slice *s) {
@@ -184,7 +203,7 @@ batten_status match_align(batten_context *ctx, size_t count, const size_t *start
   match_stack s = {.closed = opt->fit.closed != 0, .count = count};
   const double *weights = opt->fit.weights;
   size_t most = 0, *room = NULL;
-  double start = 0, first_area = 0;
+  double start = 0, area_before = 0;
   double *samples = batten_alloc_array(ctx, 2 * SAMPLES, sizeof *samples);
   double *before = batten_alloc_array(ctx, 2 * SAMPLES, sizeof *before);
   batten_status st = BATTEN_E_NOMEM;
@@ -204,9 +223,10 @@ batten_status match_align(batten_context *ctx, size_t count, const size_t *start
     st = measure(ctx, i, s.closed, slice);
     if (st < 0) break;
     sample(slice, s.closed, samples);
-    double area = s.closed ? area_of(samples) : 0;
-    if (i == 0) first_area = area;
-    if (opt->orient && (s.closed ? area * first_area < 0 : i > 0 && runs_against(before, samples))) {
+    double area = s.closed ? area_of(samples) / (slice->radius * slice->radius) : 0;
+    if (opt->orient && i > 0 &&
+        (s.closed ? turns_against(before, area_before, samples, area) : runs_against(before, samples))) {
+      area = -area;
       reverse_slice(slice, s.closed);
       reverse_samples(s.closed, samples);
       take_points(slice, starts[i], points, weights);
@@ -220,6 +240,7 @@ batten_status match_align(batten_context *ctx, size_t count, const size_t *start
       take_points(slice, starts[i], points, weights);
     }
     memcpy(before, samples, 2 * SAMPLES * sizeof *samples);
+    area_before = area;
   }
   if (st < 0) goto done;
   *out = s;

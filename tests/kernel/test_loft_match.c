@@ -100,6 +100,28 @@ static void test_circles(batten_context *ctx) {
   drop(&o);
 }
 
+/* Lines that cross themselves have areas of any sign: noise decides it. */
+static void test_eights(batten_context *ctx) {
+  uint64_t seed = 5;
+  scene s = new_scene(true);
+  double points[POINTS][2];
+  for (size_t i = 0; i < 8; i++) {
+    double start = 6 * t_uniform(&seed);
+    for (size_t k = 0; k < POINTS; k++) {
+      double a = start + 2 * PI * (double)k / POINTS;
+      points[k][0] = (1 + 0.05 * (double)i) * sin(2 * a) + 0.01 * t_uniform(&seed);
+      points[k][1] = sin(a) + 0.01 * t_uniform(&seed);
+    }
+    add_slice(&s, POINTS, points, i % 3 == 1);
+  }
+  outcome o = match(ctx, &s);
+  T_CHECK(o.st >= 0 && o.info.reversed == 3 && o.info.inflections_matched == 16 && o.info.certified == 8,
+          "eights: %zu are reversed, %zu of %zu inflections matched", o.info.reversed, o.info.inflections_matched,
+          o.info.inflections);
+  T_RATIO(o.info.max_error, 0.05, "eights: largest distance of points");
+  drop(&o);
+}
+
 /* Dents that turn slowly: four inflections, at one parameter each in all slices. */
 static void test_dents(batten_context *ctx) {
   uint64_t seed = 11;
@@ -386,6 +408,7 @@ static void test_invariance(batten_context *ctx) {
 int main(void) {
   batten_context *ctx = t_context(NULL, NULL, 1);
   test_circles(ctx);
+  test_eights(ctx);
   test_dents(ctx);
   test_frames(ctx);
   test_passing(ctx);
