@@ -255,9 +255,9 @@ void loft_pieces_free(batten_context *ctx, loft_pieces *p);
  * do not hold they are moved, legs as evenly as may be, until they do. */
 typedef struct loft_directions {
   size_t slab;
-  unsigned depth;  /* pieces may be 1 / 2^depth long */
-  double *turned;  /* [LOFT_FIELD 2^depth + 1][legs] against those that turn evenly from contour to contour */
-  bool whole;      /* all turns hold by themselves */
+  unsigned depth; /* pieces may be 1 / 2^depth long */
+  double *turned; /* [LOFT_FIELD 2^depth + 1][legs] against those that turn evenly from contour to contour */
+  bool whole;     /* all turns hold by themselves */
 } loft_directions;
 batten_status loft_directions_make(batten_context *ctx, const loft_net *net, const double *control, size_t i,
                                    double margin, unsigned depth, loft_directions *out);
@@ -287,8 +287,8 @@ batten_status loft_rows_add(batten_context *ctx, const loft_net *net, const doub
                             double below, double near, loft_rows *rows);
 
 /* The minimum of the objective under rows, where the groups [groups] of them give way, by `give` radians, rather than
- * cost more than weight times `costs` for each. Unknowns are those near to the rows, `reach` steps in the Hessian. Not the minimum
- * but another point: BATTEN_W_ACCURACY. Fails: NOMEM, TOO_LARGE, CANCELLED. */
+ * cost more than weight times `costs` for each. Unknowns are those near to the rows, `reach` steps in the Hessian.
+ * Not the minimum but another point: BATTEN_W_ACCURACY. Fails: NOMEM, TOO_LARGE, CANCELLED. */
 typedef struct loft_program {
   batten_qp_workspace *workspace;
   batten_matrix hessian;
@@ -322,8 +322,8 @@ batten_status loft_rounds(batten_context *ctx, const loft_net *net, loft_objecti
 void loft_result_free(batten_context *ctx, loft_result *r);
 
 /* From y, whose turns do not all hold, to a surface near the minimum of the objective in which they do; `free` the
- * minimum without inequalities. *steps more by those of Newton's method. *feasible: all turns are proven to hold. Fails:
- * NOMEM, TOO_LARGE, CANCELLED. */
+ * minimum without inequalities. *steps more by those of Newton's method. *feasible: all turns are proven to hold.
+ * Fails: NOMEM, TOO_LARGE, CANCELLED. */
 batten_status loft_settle(batten_context *ctx, const loft_net *net, const loft_objective *objective, double margin,
                           const double *free, double *y, size_t *steps, bool *feasible);
 
@@ -353,8 +353,8 @@ batten_status loft_make(batten_context *ctx, const loft_stack *stack, const loft
                         const double *control, batten_loft **out);
 
 /* Against the given curves at many t, in caller's unit: largest distance of the surface at the contours; and the
- * largest jump of derivatives by z up to the smoothness, k-th ones times the k-th power of the gap below. Fails:
- * NOMEM. */
+ * largest jump of derivatives by z up to the smoothness, k-th ones times the k-th power of the less of the gaps
+ * beside. Fails: NOMEM. */
 batten_status loft_measure(batten_context *ctx, const batten_loft *loft, const batten_curve *const *contours,
                            double *interpolation, double *continuity);
 

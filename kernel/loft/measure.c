@@ -64,10 +64,11 @@ static void compare_at(const gauge *g, size_t i, const strip *below, const strip
   }
   if (!below || !above) return;
   const double *z = g->loft->heights + i;
+  double gaps[2] = {z[0] - z[-1], z[1] - z[0]}, least = fmin(gaps[0], gaps[1]);
   for (unsigned k = 0; k <= g->loft->smoothness; k++) {
     worsen(&g->continuity[i], distance(lower[n - k], upper[0]));
-    differentiate(n - k, 1, lower);
-    differentiate(n - k, (z[0] - z[-1]) / (z[1] - z[0]), upper);
+    differentiate(n - k, least / gaps[0], lower);
+    differentiate(n - k, least / gaps[1], upper);
   }
 }
 

@@ -68,7 +68,7 @@ typedef struct batten_loft_info {
   double interpolation_error; /* largest distance of the surface from the contours as given (knot_shift included),
                                  over the size of the contours' box */
   double continuity_error; /* largest jump of derivatives by z up to the smoothness, k-th ones times the k-th power of
-                              the lower patch's height, over that size */
+                              the height of the lower one of both patches, over that size */
   size_t inflections;      /* of all contours */
   size_t
       inflections_unmatched; /* that have no partner in a neighbouring contour, or x'' not 0: see batten_loft_notes */
