@@ -3,45 +3,12 @@
  * displacement beside trapezoids of its table of offsets. Twins that are made here stand in without the data. */
 #include <batten/loft.h>
 #include <batten/mesh.h>
-#include <batten/solid.h>
 
 #include "loft_slices.h"
 
 enum { EVERY = 6, PARTS = 6, STEPS = 400 };
 
-/* ---- slices --------------------------------------------------------------------------------------- */
-
-static const double *slice(const stack *s, size_t i, size_t *count) {
-  *count = s->starts[i + 1] - s->starts[i];
-  return s->points[s->starts[i]];
-}
-
-static double slice_area(const stack *s, size_t i) {
-  size_t n;
-  const double *p = slice(s, i, &n);
-  double sum = 0;
-  for (size_t k = 0; k < n; k++) {
-    const double *a = p + 2 * k, *b = p + 2 * ((k + 1) % n);
-    sum += 0.5 * (a[0] * b[1] - a[1] * b[0]);
-  }
-  return sum;
-}
-
-/* Distance of q from the outline of a slice, positive outside. */
-static double slice_distance(const stack *s, size_t i, const double q[2]) {
-  size_t n;
-  const double *p = slice(s, i, &n);
-  double least = INFINITY;
-  bool inside = false;
-  for (size_t k = 0; k < n; k++) {
-    const double *a = p + 2 * k, *b = p + 2 * ((k + 1) % n), d[2] = {b[0] - a[0], b[1] - a[1]};
-    double length = d[0] * d[0] + d[1] * d[1], t = 0;
-    if (length > 0) t = fmin(fmax(((q[0] - a[0]) * d[0] + (q[1] - a[1]) * d[1]) / length, 0), 1);
-    least = fmin(least, hypot(q[0] - a[0] - t * d[0], q[1] - a[1] - t * d[1]));
-    if ((a[1] > q[1]) != (b[1] > q[1]) && q[0] < a[0] + d[0] * (q[1] - a[1]) / d[1]) inside = !inside;
-  }
-  return inside ? -least : least;
-}
+/* ---- lofts ---------------------------------------------------------------------------------------- */
 
 static batten_loft *make_loft(batten_context *ctx, const char *what, const stack *s, batten_loft_info *info) {
   batten_curve *curves[SLICES] = {NULL};
@@ -72,67 +39,31 @@ static batten_loft *make_loft(batten_context *ctx, const char *what, const stack
 
 /* ---- a heart -------------------------------------------------------------------------------------- */
 
-/* Every so many points of the slices with normals outwards: across the outline by its own points, along z by the
- * distances from the neighbours' outlines. Returns their number. */
-static size_t scatter(const stack *s, double (*points)[3], double (*normals)[3]) {
-  size_t used = 0;
-  for (size_t i = 0; i < s->count; i++) {
-    size_t n, below = i > 0 ? i - 1 : 0, above = i + 1 < s->count ? i + 1 : i;
-    const double *p = slice(s, i, &n);
-    double side = slice_area(s, i) > 0 ? 1 : -1;
-    for (size_t k = i % EVERY; k < n; k += EVERY) {
-      const double *a = p + 2 * ((k + n - 2) % n), *b = p + 2 * ((k + 2) % n), *q = p + 2 * k;
-      double length = hypot(b[0] - a[0], b[1] - a[1]);
-      double rise = slice_distance(s, above, q) - slice_distance(s, below, q);
-      memcpy(points[used], (double[3]){q[0], q[1], s->heights[i]}, sizeof points[used]);
-      memcpy(normals[used],
-             (double[3]){side * (b[1] - a[1]) / length, side * (a[0] - b[0]) / length,
-                         rise / (s->heights[above] - s->heights[below])},
-             sizeof normals[used]);
-      used++;
-    }
-  }
-  return used;
-}
-
 /* The solid between the planes of the first and last slice. */
-static batten_mesh *make_solid(batten_context *ctx, const stack *s) {
-  double(*points)[3] = malloc(s->used * sizeof *points), (*normals)[3] = malloc(s->used * sizeof *normals);
-  batten_solid *solid = NULL;
+static batten_mesh *make_mesh(batten_context *ctx, const stack *s) {
   batten_mesh *mesh = NULL;
-  batten_solid_options o = batten_solid_options_default();
   batten_polygonize_options p = batten_polygonize_options_default();
-  if (!points || !normals) abort();
-  size_t count = scatter(s, points, normals);
-  o.normals = normals[0];
-  o.orientation = BATTEN_ORIENT_GIVEN;
-  o.orient_data = BATTEN_ORIENT_DATA_PAIRS;
-  o.check_cells = 8;
-  o.spline.loo_samples = 0;
-  batten_solid_info info;
-  double t0 = batten_now();
-  batten_status st = batten_solid_fit(ctx, 3, count, points[0], &o, &solid, &info);
-  double t1 = batten_now();
-  if (st >= 0) {
-    batten_field field = batten_solid_field(solid);
-    batten_solid_box(solid, p.lower, p.upper);
-    for (size_t c = 0; c < 2; c++) {
-      double room = 0.25 * (p.upper[c] - p.lower[c]);
-      p.lower[c] -= room;
-      p.upper[c] += room;
-    }
-    p.lower[2] = s->heights[0];
-    p.upper[2] = s->heights[s->count - 1];
-    p.cell = (p.upper[0] - p.lower[0]) / 40;
-    p.accuracy = 1e-4;
-    p.improve = 1;
-    st = batten_polygonize(ctx, &field, count, points[0], &p, &mesh, NULL);
+  double start = batten_now();
+  batten_solid *solid = slices_solid(ctx, s, EVERY);
+  if (!T_CHECK(solid, "the solid of the slices: %s", solid ? "" : batten_error(ctx))) return NULL;
+  batten_field field = batten_solid_field(solid);
+  size_t count;
+  const double *points = batten_solid_points(solid, &count);
+  batten_solid_box(solid, p.lower, p.upper);
+  for (size_t c = 0; c < 2; c++) {
+    double room = 0.25 * (p.upper[c] - p.lower[c]);
+    p.lower[c] -= room;
+    p.upper[c] += room;
   }
-  printf("# solid of %zu points: %.2f s, polygonised in %.2f s\n", count, t1 - t0, batten_now() - t1);
-  T_CHECK(st == BATTEN_W_CLIPPED, "the solid of the slices, cut at the end planes: %s", batten_error(ctx));
+  p.lower[2] = s->heights[0];
+  p.upper[2] = s->heights[s->count - 1];
+  p.cell = (p.upper[0] - p.lower[0]) / 40;
+  p.accuracy = 1e-4;
+  p.improve = 1;
+  T_CHECK(batten_polygonize(ctx, &field, count, points, &p, &mesh, NULL) == BATTEN_W_CLIPPED,
+          "polygonised and cut at the end planes: %s", batten_error(ctx));
+  printf("# solid of %zu points, polygonised: %.2f s\n", count, batten_now() - start);
   batten_solid_free(solid);
-  free(points);
-  free(normals);
   return mesh;
 }
 
@@ -176,7 +107,7 @@ static void check_heart(batten_context *ctx, const char *what, const stack *s, h
   printf("# %s: volume %.6g, of slices %.6g between the end planes, %.6g with half a gap beyond\n", what, volume,
          areas, areas + ends);
   T_RATIO(fabs(volume / areas - 1), allowed.areas, "%s: volume beside the areas of its slices", what);
-  batten_mesh *mesh = make_solid(ctx, s);
+  batten_mesh *mesh = make_mesh(ctx, s);
   if (mesh && surface) {
     size_t count = batten_mesh_vertex_count(mesh);
     double *places = malloc(2 * count * sizeof *places), *distances = malloc(count * sizeof *distances), mean = 0;

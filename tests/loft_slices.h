@@ -3,6 +3,8 @@
 #ifndef LOFT_SLICES_H
 #define LOFT_SLICES_H
 
+#include <batten/solid.h>
+
 #include "scenes.h"
 #include "tap.h"
 
@@ -110,6 +112,81 @@ static inline void make_ship(stack *s) {
     }
     end_slice(s, 5, 6 * z);
   }
+}
+
+/* ---- outlines, and the solid that they bound ------------------------------------------------------ */
+
+static inline const double *slice(const stack *s, size_t i, size_t *count) {
+  *count = s->starts[i + 1] - s->starts[i];
+  return s->points[s->starts[i]];
+}
+
+static inline double slice_area(const stack *s, size_t i) {
+  size_t n;
+  const double *p = slice(s, i, &n);
+  double sum = 0;
+  for (size_t k = 0; k < n; k++) {
+    const double *a = p + 2 * k, *b = p + 2 * ((k + 1) % n);
+    sum += 0.5 * (a[0] * b[1] - a[1] * b[0]);
+  }
+  return sum;
+}
+
+/* Distance of q from the outline of a slice, positive outside. */
+static inline double slice_distance(const stack *s, size_t i, const double q[2]) {
+  size_t n;
+  const double *p = slice(s, i, &n);
+  double least = INFINITY;
+  bool inside = false;
+  for (size_t k = 0; k < n; k++) {
+    const double *a = p + 2 * k, *b = p + 2 * ((k + 1) % n), d[2] = {b[0] - a[0], b[1] - a[1]};
+    double length = d[0] * d[0] + d[1] * d[1], t = 0;
+    if (length > 0) t = fmin(fmax(((q[0] - a[0]) * d[0] + (q[1] - a[1]) * d[1]) / length, 0), 1);
+    least = fmin(least, hypot(q[0] - a[0] - t * d[0], q[1] - a[1] - t * d[1]));
+    if ((a[1] > q[1]) != (b[1] > q[1]) && q[0] < a[0] + d[0] * (q[1] - a[1]) / d[1]) inside = !inside;
+  }
+  return inside ? -least : least;
+}
+
+/* Every so many points of the slices with normals outwards: across the outline by its own points, along z by the
+ * distances from the neighbours' outlines. Returns their number. */
+static inline size_t slices_scatter(const stack *s, size_t every, double (*points)[3], double (*normals)[3]) {
+  size_t used = 0;
+  for (size_t i = 0; i < s->count; i++) {
+    size_t n, below = i > 0 ? i - 1 : 0, above = i + 1 < s->count ? i + 1 : i;
+    const double *p = slice(s, i, &n);
+    double side = slice_area(s, i) > 0 ? 1 : -1;
+    for (size_t k = i % every; k < n; k += every) {
+      const double *a = p + 2 * ((k + n - 2) % n), *b = p + 2 * ((k + 2) % n), *q = p + 2 * k;
+      double length = hypot(b[0] - a[0], b[1] - a[1]);
+      double rise = slice_distance(s, above, q) - slice_distance(s, below, q);
+      memcpy(points[used], (double[3]){q[0], q[1], s->heights[i]}, sizeof points[used]);
+      memcpy(normals[used],
+             (double[3]){side * (b[1] - a[1]) / length, side * (a[0] - b[0]) / length,
+                         rise / (s->heights[above] - s->heights[below])},
+             sizeof normals[used]);
+      used++;
+    }
+  }
+  return used;
+}
+
+/* A volume spline through every so many points; NULL where that fails. */
+static inline batten_solid *slices_solid(batten_context *ctx, const stack *s, size_t every) {
+  double(*points)[3] = malloc(s->used * sizeof *points), (*normals)[3] = malloc(s->used * sizeof *normals);
+  batten_solid *solid = NULL;
+  batten_solid_options o = batten_solid_options_default();
+  if (!points || !normals) abort();
+  size_t count = slices_scatter(s, every, points, normals);
+  o.normals = normals[0];
+  o.orientation = BATTEN_ORIENT_GIVEN;
+  o.orient_data = BATTEN_ORIENT_DATA_PAIRS;
+  o.check_cells = 8; /* normals are known: the check is not needed */
+  o.spline.loo_samples = 0;
+  if (batten_solid_fit(ctx, 3, count, points[0], &o, &solid, NULL) < 0) solid = NULL;
+  free(points);
+  free(normals);
+  return solid;
 }
 
 #endif
