@@ -151,7 +151,8 @@ static void keep_better(build *b) {
   b->have_best = true;
 }
 
-static batten_status try_degree(build *b, unsigned degree, bool *done) {
+/* *failing: vertices of this attempt that do. */
+static batten_status try_degree(build *b, unsigned degree, size_t *failing, bool *done) {
   attempt *a = &b->trial;
   a->degree = degree;
   batten_status st = solve(b, a);
@@ -160,6 +161,7 @@ static batten_status try_degree(build *b, unsigned degree, bool *done) {
   if (st >= 0) st = prove(b->ctx, a->loft, &a->proof);
   b->info.time_check_s += batten_now() - start;
   if (st < 0) return st;
+  *failing = a->result.elastic_count;
   keep_better(b);
   *done = b->best.proof.certified;
   return BATTEN_OK;
@@ -216,12 +218,22 @@ static batten_status check_degree(build *b, unsigned *degree) {
   return BATTEN_OK;
 }
 
+/* The degree rises, and knots are inserted, as long as fewer vertices fail for it: what helps none of them at once is
+ * no matter of unknowns, and attempts become dearer each time. */
 static batten_status attempts(build *b, unsigned degree) {
   bool done = false;
   batten_status st = BATTEN_OK;
+  size_t least = SIZE_MAX;
   for (unsigned knots = 0; st >= 0 && !done; knots++) {
-    for (unsigned n = degree; n <= b->opt->degree_z_max && st >= 0 && !done; n++) st = try_degree(b, n, &done);
-    if (st < 0 || done || knots == b->opt->knot_rounds || b->best.result.elastic_count == 0) break;
+    size_t before = SIZE_MAX, failing = SIZE_MAX;
+    for (unsigned n = degree; n <= b->opt->degree_z_max && st >= 0 && !done; n++) {
+      before = failing;
+      st = try_degree(b, n, &failing, &done);
+      if (failing >= before) break;
+    }
+    size_t left = b->best.result.elastic_count;
+    if (st < 0 || done || knots == b->opt->knot_rounds || left == 0 || left >= least) break;
+    least = left;
     for (size_t k = 0; k < b->best.result.elastic_count && st >= 0; k++)
       st = insert_near(b, &b->best.result.elastic[k]);
     if (st >= 0) st = make_slabs(b);

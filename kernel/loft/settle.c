@@ -6,11 +6,14 @@
  *
  *   c_0(zeta) = [p turned by lower, q] >= 0,   c_1(zeta) = -[p turned by upper, q] >= 0
  *
- * which are bilinear in the unknowns, by an augmented Lagrangian F + mu / 2 sum w max(0, lambda / mu - c)^2. Its
- * minima in y are found by Newton's method with the Hessian of F and the squares of the gradients of c: symmetric,
- * positive definite, and as sparse as H [Nocedal, Wright: Numerical Optimization, ch. 17]. Heights at which a
- * condition fails most are added on the way. Twice the margin is asked for, so that what lies between the heights
- * holds too: loft_shortage, which proves it for all heights, decides. */
+ * over |p| |q| of the surface before, so that they are about radians where legs become short between contours too.
+ * They are bilinear in the unknowns, and kept by an augmented Lagrangian F + mu / 2 sum w max(0, lambda / mu - c)^2.
+ * Its minima in y are found by Newton's method with the Hessian of F and the squares of the gradients of c:
+ * symmetric, positive definite, and as sparse as H [Nocedal, Wright: Numerical Optimization, ch. 17]. Heights at
+ * which a condition fails most are added on the way. Twice the margin is asked for, so that what lies between the
+ * heights holds too: loft_shortage, which proves it for all heights, decides. Where contours hardly turn, that would
+ * be lost in rounding: sections away from them are asked for a bit more, by how much rises with the square of the
+ * distance, as turns may that touch zero. */
 #include <string.h>
 
 #include "base/checked.h"
@@ -19,30 +22,52 @@
 
 /* Heights of a vertex at first, and at most; where others are looked for. Rounds of multipliers, Newton steps of
  * each, halvings of a step. Neighbours of a failing vertex that are looked after too. */
-enum { HEIGHTS = 19, HEIGHTS_MAX = 48, FINE = 400, OUTER = 30, INNER = 20, HALVINGS = 20, AROUND = 2 };
+enum {
+  HEIGHTS = 19,
+  HEIGHTS_MAX = 48,
+  FINE = 400,
+  OUTER = 30,
+  INNER = 20,
+  HALVINGS = 20,
+  AROUND = 2,
+  STALE = 8,
+  SHORTER = 2
+};
 
 static const double PI = 3.14159265358979323846;
 static const double MU_FIRST = 100, MU_RAISE = 4, MU_MOST = 1e6;
 /* A round that does not bring the worst condition below this part of what it was raises mu. */
 static const double FALLS = 0.5;
 /* Newton's method has done when a step promises less than this part of the penalty. */
-static const double ENOUGH = 1e-2;
+static const double ENOUGH = 1e-3;
 static const double ARMIJO = 1e-4;
+/* Where legs become short the conditions bend more than H and the squares of their gradients say: steps that had to
+ * be halved more than SHORTER times raise the part of H. */
+static const double DAMP = 10, DAMP_MOST = 1e8;
 /* Of vertices that only keep eq. 11, what counts as failing, radians. */
 static const double FREE_SIZE = 1e-3;
+/* The bit that sections half way between contours turn beyond what they must, radians. */
+static const double BIT = 1e-6;
+/* Legs count as no shorter than this part of what they are at the contours. */
+static const double SHORTEST = 1e-2;
+/* Rounds of multipliers without falling below this part of the least that was missing, after which there is no
+ * solution. */
+static const double LESS = 0.9;
 
 /* A vertex with its legs as functions of the unknowns that they depend on. */
 typedef struct corner {
   size_t slab, v;
-  loft_bound bound;
   double weight;     /* of the objective's legs there */
-  double area;       /* |p| |q|: what turns [p, q] into radians about */
+  double turn[2][2]; /* by lower and by upper: cosine and sine */
+  double length[2];  /* mean ones at the contours */
   double size;       /* of the margin, radians */
+  bool free;         /* only eq. 11 is asked for */
   size_t count;      /* unknowns */
   uint32_t *unknown; /* [count] */
   double *leg[2];    /* [degree + 1][count] */
   size_t heights;
   double at[HEIGHTS_MAX], lambda[2][HEIGHTS_MAX];
+  double area[HEIGHTS_MAX]; /* |p| |q| of the last surface */
 } corner;
 
 typedef struct work {
@@ -51,6 +76,7 @@ typedef struct work {
   const loft_objective *objective;
   const double *free;
   double margin, mu;
+  double damping; /* times H, in the matrix of Newton's method */
   size_t count, room;
   corner *corners;
   size_t *start; /* [slabs + 1] first vertex of each, of all */
@@ -94,6 +120,58 @@ static batten_status work_start(work *w, const double *y) {
   memcpy(w->y, y, numbers * sizeof *y);
   loft_net_expand(w->net, w->y, w->control);
   return BATTEN_OK;
+}
+
+/* ---- conditions ---------------------------------------------------------------------------------- */
+
+/* Both conditions of a corner at a height. */
+typedef struct spot {
+  double basis[ORDER], p[2], q[2], value[2];
+} spot;
+
+static void get_legs(const work *w, const corner *c, double (*leg)[ORDER][2]) {
+  for (size_t e = 0; e < 2; e++) loft_leg(w->net, w->control, c->slab, c->v + e, leg[e]);
+}
+
+/* What turns are asked for beyond their bound. */
+static double bit(const corner *c, double zeta) {
+  double rise = 4 * zeta * (1 - zeta);
+  return c->free ? 0 : BIT * rise * rise;
+}
+
+/* |p| |q| */
+static double area_at(const corner *c, const spot *at) {
+  return fmax(hypot(at->p[0], at->p[1]), SHORTEST * c->length[0]) *
+         fmax(hypot(at->q[0], at->q[1]), SHORTEST * c->length[1]);
+}
+
+/* area 0: as it is there. */
+static void look(const work *w, const corner *c, double (*leg)[ORDER][2], double zeta, double area, spot *out) {
+  unsigned n = w->net->degree;
+  *out = (spot){.basis = {1}};
+  for (unsigned r = 1; r <= n; r++)
+    for (unsigned k = r + 1; k-- > 0;)
+      out->basis[k] = (k < r ? (1 - zeta) * out->basis[k] : 0) + (k ? zeta * out->basis[k - 1] : 0);
+  for (unsigned k = 0; k <= n; k++)
+    for (int x = 0; x < 2; x++) {
+      out->p[x] += out->basis[k] * leg[0][k][x];
+      out->q[x] += out->basis[k] * leg[1][k][x];
+    }
+  if (area == 0) area = area_at(c, out);
+  for (int f = 0; f < 2; f++) {
+    const double *turn = c->turn[f];
+    double turned[2] = {turn[0] * out->p[0] - turn[1] * out->p[1], turn[1] * out->p[0] + turn[0] * out->p[1]};
+    out->value[f] = (f ? -1 : 1) * loft_cross(turned, out->q) / area - bit(c, zeta);
+  }
+}
+
+static void new_height(const work *w, corner *c, double (*leg)[ORDER][2], double zeta) {
+  spot at;
+  size_t s = c->heights++;
+  look(w, c, leg, zeta, 0, &at);
+  c->at[s] = zeta;
+  c->area[s] = area_at(c, &at);
+  c->lambda[0][s] = c->lambda[1][s] = 0;
 }
 
 /* ---- vertices ------------------------------------------------------------------------------------ */
@@ -154,17 +232,27 @@ static batten_status enroll(work *w, size_t i, size_t v) {
   }
   double p = (slab->length[0][v] + slab->length[1][v]) / 2, q = (slab->length[0][next] + slab->length[1][next]) / 2;
   corner *c = &w->corners[w->count];
-  *c = (corner){.slab = i,
-                .v = v,
-                .bound = bound,
-                .weight = fmax(p, q) / w->objective->polygon,
-                .area = p * q,
-                .size = slab->wanted[v] == LOFT_FREE ? FREE_SIZE : fmin(fabs(bound.lower), fabs(bound.upper)),
-                .heights = HEIGHTS};
-  for (size_t s = 0; s < HEIGHTS; s++) c->at[s] = 0.5 - 0.5 * cos(PI * (double)(s + 1) / (HEIGHTS + 1));
+  memset(c, 0, sizeof *c);
+  c->slab = i;
+  c->v = v;
+  c->free = slab->wanted[v] == LOFT_FREE;
+  c->weight = fmax(p, q) / w->objective->polygon;
+  c->length[0] = p;
+  c->length[1] = q;
+  c->size = c->free ? FREE_SIZE : fmin(fabs(bound.lower), fabs(bound.upper));
+  for (size_t f = 0; f < 2; f++) {
+    double angle = f ? bound.upper : bound.lower;
+    c->turn[f][0] = cos(angle);
+    c->turn[f][1] = sin(angle);
+  }
   w->count++;
   w->in[w->start[i] + v] = true;
-  return make_legs(w, c);
+  batten_status st = make_legs(w, c);
+  if (st < 0) return st;
+  double leg[2][ORDER][2];
+  get_legs(w, c, leg);
+  for (size_t s = 0; s < HEIGHTS; s++) new_height(w, c, leg, 0.5 - 0.5 * cos(PI * (double)(s + 1) / (HEIGHTS + 1)));
+  return BATTEN_OK;
 }
 
 /* Vertices whose turns do not hold, and their neighbours; how much is missing together; whether some are new. */
@@ -227,36 +315,7 @@ done:
   return st;
 }
 
-/* ---- conditions ---------------------------------------------------------------------------------- */
-
-/* Both conditions of a corner at a height, in radians about. */
-typedef struct spot {
-  double basis[ORDER], p[2], q[2], value[2];
-} spot;
-
-static double angle_of(const corner *c, int f) { return f ? c->bound.upper : c->bound.lower; }
-
-static void look(const work *w, const corner *c, double (*leg)[ORDER][2], double zeta, spot *out) {
-  unsigned n = w->net->degree;
-  *out = (spot){.basis = {1}};
-  for (unsigned r = 1; r <= n; r++)
-    for (unsigned k = r + 1; k-- > 0;)
-      out->basis[k] = (k < r ? (1 - zeta) * out->basis[k] : 0) + (k ? zeta * out->basis[k - 1] : 0);
-  for (unsigned k = 0; k <= n; k++)
-    for (int x = 0; x < 2; x++) {
-      out->p[x] += out->basis[k] * leg[0][k][x];
-      out->q[x] += out->basis[k] * leg[1][k][x];
-    }
-  for (int f = 0; f < 2; f++) {
-    double cosine = cos(angle_of(c, f)), sine = sin(angle_of(c, f));
-    double turned[2] = {cosine * out->p[0] - sine * out->p[1], sine * out->p[0] + cosine * out->p[1]};
-    out->value[f] = (f ? -1 : 1) * loft_cross(turned, out->q) / c->area;
-  }
-}
-
-static void get_legs(const work *w, const corner *c, double (*leg)[ORDER][2]) {
-  for (size_t e = 0; e < 2; e++) loft_leg(w->net, w->control, c->slab, c->v + e, leg[e]);
-}
+/* ---- the Lagrangian ------------------------------------------------------------------------------ */
 
 /* The Lagrangian. */
 static double value_of(work *w, const double *y) {
@@ -268,7 +327,7 @@ static double value_of(work *w, const double *y) {
     get_legs(w, c, leg);
     for (size_t s = 0; s < c->heights; s++) {
       spot at;
-      look(w, c, leg, c->at[s], &at);
+      look(w, c, leg, c->at[s], c->area[s], &at);
       for (int f = 0; f < 2; f++) {
         double t = fmax(0, c->lambda[f][s] / w->mu - at.value[f]);
         w->penalty += 0.5 * w->mu * c->weight * t * t;
@@ -279,9 +338,9 @@ static double value_of(work *w, const double *y) {
 }
 
 /* A condition that fails by t: its gradient, and the square of it. */
-static void add_condition(work *w, const corner *c, const spot *at, int f, double t) {
-  double sign = (f ? -1 : 1) / c->area, weight = w->mu * c->weight;
-  double cosine = cos(angle_of(c, f)), sine = sin(angle_of(c, f));
+static void add_condition(work *w, const corner *c, const spot *at, size_t s, int f, double t) {
+  double sign = (f ? -1 : 1) / c->area[s], weight = w->mu * c->weight;
+  double cosine = c->turn[f][0], sine = c->turn[f][1];
   double by_q[2] = {-sign * (sine * at->p[0] + cosine * at->p[1]), sign * (cosine * at->p[0] - sine * at->p[1])};
   double by_p[2] = {sign * (cosine * at->q[1] - sine * at->q[0]), -sign * (cosine * at->q[0] + sine * at->q[1])};
   size_t n = 2 * c->count;
@@ -308,11 +367,11 @@ static void add_corner(work *w, const corner *c) {
   memset(w->local, 0, n * n * sizeof *w->local);
   for (size_t s = 0; s < c->heights; s++) {
     spot at;
-    look(w, c, leg, c->at[s], &at);
+    look(w, c, leg, c->at[s], c->area[s], &at);
     for (int f = 0; f < 2; f++) {
       double t = c->lambda[f][s] / w->mu - at.value[f];
       if (!(t > 0)) continue;
-      add_condition(w, c, &at, f, t);
+      add_condition(w, c, &at, s, f, t);
       any = true;
     }
   }
@@ -333,7 +392,7 @@ static void assemble(work *w) {
     for (size_t j = h->starts[row]; j < h->starts[row + 1]; j++) {
       size_t column = h->columns[j];
       double *block = block_matrix_at(&w->a, row, column);
-      block[0] = block[3] = h->values[j];
+      block[0] = block[3] = (1 + w->damping) * h->values[j];
       for (size_t x = 0; x < 2; x++)
         w->gradient[2 * row + x] += h->values[j] * (w->y[2 * column + x] - w->free[2 * column + x]);
     }
@@ -343,19 +402,7 @@ static void assemble(work *w) {
 
 /* ---- Newton's method, multipliers ---------------------------------------------------------------- */
 
-/* Beside tiny legs rounding can be more than what is left of the least eigenvalue: then the diagonal grows. Where
- * that does not help either: false, and y stays as good as it is. */
-static bool factor(work *w) {
-  for (double grown = 0; grown < 1e-3; grown = fmax(64 * grown, 0x1p-44)) {
-    for (size_t row = 0; row < w->a.rows && grown > 0; row++) {
-      double *block = block_matrix_at(&w->a, row, row);
-      block[0] *= 1 + grown;
-      block[3] *= 1 + grown;
-    }
-    if (block_factor(w->ctx, w->plan, &w->a, NULL) >= 0) return true;
-  }
-  return false;
-}
+static void damp(work *w) { w->damping = fmin(fmax(DAMP * w->damping, 1), DAMP_MOST); }
 
 /* The minimum for fixed lambda and mu. */
 static batten_status minimise(work *w, double progress) {
@@ -365,8 +412,15 @@ static batten_status minimise(work *w, double progress) {
     batten_status st = batten_progress(w->ctx, "quadratic program", progress);
     if (st < 0) return st;
     assemble(w);
-    if (!factor(w)) return BATTEN_OK;
+    st = block_factor(w->ctx, w->plan, &w->a, NULL);
     w->steps++;
+    if (st == BATTEN_E_SINGULAR) { /* to rounding */
+      batten_fail(w->ctx, BATTEN_OK, "%s", "");
+      if (w->damping == DAMP_MOST) return BATTEN_OK;
+      damp(w);
+      continue;
+    }
+    if (st < 0) return st;
     for (size_t k = 0; k < n; k++) w->step[k] = -w->gradient[k];
     block_solve(w->ctx, w->plan, w->step);
     double slope = 0, length = 1, next = value;
@@ -377,7 +431,10 @@ static batten_status minimise(work *w, double progress) {
       next = value_of(w, w->trial);
       if (next <= value + ARMIJO * length * slope) break;
     }
-    if (halvings == HALVINGS) return BATTEN_OK;
+    if (halvings > SHORTER) damp(w);
+    if (halvings == 0) w->damping = w->damping > 1 ? w->damping / DAMP : 0;
+    if (halvings == HALVINGS && w->damping == DAMP_MOST) return BATTEN_OK;
+    if (halvings == HALVINGS) continue;
     memcpy(w->y, w->trial, n * sizeof *w->y);
     value = next;
     if (-slope <= ENOUGH * w->penalty) return BATTEN_OK;
@@ -387,23 +444,21 @@ static batten_status minimise(work *w, double progress) {
 
 /* Where a condition fails most is one more height. */
 static void add_height(const work *w, corner *c, double (*leg)[ORDER][2]) {
-  double worst = -0.25 * c->size, height = NAN;
+  double worst = 0.25, height = NAN;
   for (size_t s = 1; s < FINE; s++) {
     double zeta = 0.5 - 0.5 * cos(PI * (double)s / FINE);
     spot at;
-    look(w, c, leg, zeta, &at);
-    for (int f = 0; f < 2; f++)
-      if (at.value[f] < worst) {
-        worst = at.value[f];
-        height = zeta;
-      }
+    look(w, c, leg, zeta, 0, &at);
+    double fails = -fmin(at.value[0], at.value[1]) / (c->size + bit(c, zeta));
+    if (fails > worst) {
+      worst = fails;
+      height = zeta;
+    }
   }
   for (size_t s = 0; s < c->heights; s++)
     if (fabs(c->at[s] - height) < 1e-9) return;
   if (isnan(height) || c->heights == HEIGHTS_MAX) return;
-  c->at[c->heights] = height;
-  c->lambda[0][c->heights] = c->lambda[1][c->heights] = 0;
-  c->heights++;
+  new_height(w, c, leg, height);
 }
 
 /* Multipliers of the minimum; by how many margins the worst condition fails. */
@@ -416,11 +471,14 @@ static double update(work *w) {
     get_legs(w, c, leg);
     for (size_t s = 0; s < c->heights; s++) {
       spot at;
-      look(w, c, leg, c->at[s], &at);
+      look(w, c, leg, c->at[s], c->area[s], &at);
+      double area = area_at(c, &at), before = c->area[s] / area;
       for (int f = 0; f < 2; f++) {
-        c->lambda[f][s] = fmax(0, c->lambda[f][s] - w->mu * at.value[f]);
-        worst = fmax(worst, -at.value[f] / c->size);
+        double value = (at.value[f] + bit(c, c->at[s])) * before - bit(c, c->at[s]);
+        c->lambda[f][s] = fmax(0, c->lambda[f][s] - w->mu * at.value[f]) / before;
+        worst = fmax(worst, -value / (c->size + bit(c, c->at[s])));
       }
+      c->area[s] = area;
     }
     add_height(w, c, leg);
   }
@@ -430,11 +488,12 @@ static double update(work *w) {
 batten_status loft_settle(batten_context *ctx, const loft_net *net, const loft_objective *objective, double margin,
                           const double *free, double *y, size_t *steps, bool *feasible) {
   work w = {.ctx = ctx, .net = net, .objective = objective, .free = free, .margin = margin, .mu = MU_FIRST};
-  double shortage = 0, worst = INFINITY;
+  double shortage = 0, worst = INFINITY, least = INFINITY;
   bool more = false;
+  unsigned stale = 0;
   batten_status st = work_start(&w, y);
   if (st >= 0) st = look_around(&w, &shortage, &more);
-  for (unsigned outer = 0; outer < OUTER && st >= 0 && shortage > 0; outer++) {
+  for (unsigned outer = 0; outer < OUTER && st >= 0 && shortage > 0 && stale < STALE; outer++) {
     if (more) st = make_plan(&w);
     if (st >= 0) st = minimise(&w, (double)outer / OUTER);
     if (st < 0) break;
@@ -442,6 +501,8 @@ batten_status loft_settle(batten_context *ctx, const loft_net *net, const loft_o
     if (now > FALLS * worst) w.mu = fmin(w.mu * MU_RAISE, MU_MOST);
     worst = now;
     st = look_around(&w, &shortage, &more);
+    stale = shortage < LESS * least ? 0 : stale + 1;
+    least = fmin(least, shortage);
   }
   if (st >= 0) {
     memcpy(y, w.y, 2 * net->z.columns * sizeof *y);

@@ -91,8 +91,9 @@ typedef struct batten_loft_info {
 /* A loft through contours [count] at heights [count], ascending; count >= 2. All contours open, or all closed; over
  * one domain; degree 2 .. BATTEN_CURVE_DEGREE_MAX (lower ones are raised to the highest); none crosses the next one's
  * direction. Where there is no solution, these are tried in order until there is one: new separators, finer
- * inequalities, degree n + 1 and so on, more knots next to the vertices that have none; then inequalities of single
- * vertices give way (elastic) as little as possible, and are named.
+ * inequalities (where few vertices of the polygons fail), Newton's method on the turns themselves, degree n + 1 and so
+ * on, more knots next to the vertices that have none; the latter two only as long as fewer vertices fail for it. Then
+ * inequalities of single vertices give way (elastic) as little as possible, and are named.
  *   unconstrained  NULL, or a new loft: the minimum without inequalities, of the same degree and knots, to compare
  * with info           NULL, or the figures Progress phases: "contours", "objective", "quadratic program", "certify".
  * BATTEN_OK          proven on all sign_pairs
