@@ -197,7 +197,14 @@ batten_status loft_read(loft_work *w) {
   batten_file_kind kind;
   batten_status st = batten_file_identify(w->run.ctx, w->request->common.input, &kind);
   if (st < 0) return st;
-  st = kind == BATTEN_FILE_CURVES ? read_curves(w) : read_slices(w);
+  if (kind == BATTEN_FILE_POINTS || kind == BATTEN_FILE_UNKNOWN)
+    st = read_slices(w); /* tells what is wrong where it is unknown */
+  else if (kind == BATTEN_FILE_CURVES)
+    st = read_curves(w);
+  else
+    st = batten_fail(w->run.ctx, BATTEN_E_FORMAT,
+                     "contours: there are none in the file; give curves, as batten curve writes them to .json, or "
+                     "slices of points (batten inspect tells what a file has)");
   w->time_read_s = batten_now() - start - w->time_match_s;
   return st;
 }

@@ -135,6 +135,7 @@ static void use_words(char *text, size_t size) {
       {", or opt.improve larger than 0", ""},
       {"matrix.n: ", ""},
       {"planes[", "contours["},
+      {"(2 smooth_z + 1 .. degree_z_max), or 0", "(2 --smooth-z + 1 .. --degree-z-max)"},
       {"the context allows", "allowed are"},
       {"opt.time_limit_s", "--time-limit"},
       {"opt.iteration_limit", "--iterations"},

@@ -85,6 +85,8 @@ rows = [l.split(",") for l in open("sections.csv")][1:]
 assert len({r[0] for r in rows}) == 19
 z = sorted({float(r[4]) for r in rows})
 assert len(z) == 19 and z[0] == 0 and z[-1] == 12, z'
+run 1 "surface.json: contours: there are none in the file; give curves" loft surface.json
+run 1 "batten: --degree-z: 9; must be 3 .. 5 (2 --smooth-z + 1 .. --degree-z-max)" loft contours.json --degree-z 9 --degree-z-max 5
 run 0 "" loft contours.json --quiet -o back.json --report back.report.json
 check "the contours give the same surface again" cmp surface.json back.json
 is back.report.json points None

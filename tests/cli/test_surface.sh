@@ -35,6 +35,21 @@ holds r.json area '(x - 6.36082899656)^2 < 1e-16'
 check "what is printed: $(tr '\n' ';' <out)" grep -q '^convexity .*proven' out
 check "the degree is printed" grep -q '^surface .*degree 2 x 2, 4 x 3 control points, 2 x 1 spans' out
 
+# Its sections v = const are the plane parabolas z = x^2 / 2 + const, in two spans.
+is r.json section_pairs 2
+is r.json section_violations 0
+is r.json sections_certified True
+check "they are printed" grep -q '^sections .*proven to bend as the end sections in all 2 span pairs' out
+# Where the middle one of three rows bends the other way, they do not, and where rows are no planes there are none.
+sed 's/\[0.5, 1, 0\]/[0.5, 1, 4]/; s/\[1.5, 1, 1\]/[1.5, 1, 4]/' cup.json >bent.json
+run 0 "" inspect bent.json --report bent.r
+is bent.r sections_certified False
+holds bent.r section_violations 'x >= 1'
+sed 's/\[0.5, 1, 0\]/[0.5, 1.2, 0]/' cup.json >wavy.json
+run 0 "" inspect wavy.json --report wavy.r
+is wavy.r section_pairs None
+is wavy.r sections_certified None
+
 # The same with -y^2 / 4 is a saddle.
 surface - 0 1 >saddle.json
 run 0 "" inspect saddle.json --report r.json
