@@ -135,6 +135,8 @@ static void use_words(char *text, size_t size) {
       {", or opt.improve larger than 0", ""},
       {"matrix.n: ", ""},
       {"planes[", "contours["},
+      {"reverse it by batten_curve_reverse", "reverse its knots and control points in the file"},
+      {"bring it there by batten_curve_transform", "scale its knots in the file"},
       {"(2 smooth_z + 1 .. degree_z_max), or 0", "(2 --smooth-z + 1 .. --degree-z-max)"},
       {"the context allows", "allowed are"},
       {"opt.time_limit_s", "--time-limit"},

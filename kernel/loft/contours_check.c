@@ -196,9 +196,7 @@ batten_status contours_check_directions(batten_context *ctx, size_t count, const
     walk(raw + i, both + i % 2);
     if (run_against(raw->closed, both + (i - 1) % 2, both + i % 2))
       st = batten_fail(ctx, BATTEN_E_INVALID,
-                       "contours[%zu]: runs against contours[%zu]%s; reverse it by batten_curve_reverse (batten loft "
-                       "--reverse)",
-                       i, i - 1,
+                       "contours[%zu]: runs against contours[%zu]%s; reverse it by batten_curve_reverse", i, i - 1,
                        raw->closed ? ", one clockwise and the other counter-clockwise" : " for most of its length");
   }
   batten_free(ctx, both);

@@ -91,6 +91,18 @@ run 0 "" loft contours.json --quiet -o back.json --report back.report.json
 check "the contours give the same surface again" cmp surface.json back.json
 is back.report.json points None
 is back.report.json certified True
+python3 - <<'END'
+import json
+d = json.load(open("contours.json"))
+c = d["curves"][1]
+c["knots"] = [2 * k for k in c["knots"]]
+json.dump(d, open("longer.json", "w"))
+c["knots"] = [1 - k / 2 for k in c["knots"][::-1]]
+c["control_points"].reverse()
+json.dump(d, open("against.json", "w"))
+END
+run 1 "longer.json: contours[1]: from t = 0 to 2, but contours[0] from 0 to 1; scale its knots in the file" loft longer.json
+run 1 "clockwise and the other counter-clockwise; reverse its knots and control points in the file" loft against.json
 run 1 "contours.json: contours: the file has curves; --closed, --degree" loft contours.json --closed
 check "the mesh is a tube" python3 -c '
 import subprocess, sys, json
