@@ -70,7 +70,7 @@ static const cli_option table[] = {
     {"smooth-z", OPT_SMOOTH_Z, "L", "continuous derivatives across contours, 1 or 2; default as the contours have"},
     {"start-slope", OPT_START_SLOPE, "X,Y", "dx/dz, dy/dz of the surface at the first contour; default free"},
     {"end-slope", OPT_END_SLOPE, "X,Y", "the same at the last contour"},
-    {"tension", OPT_TENSION, "W", "of legs and of the paths of end points (closed: of all) by z; default 0.001"},
+    {"tension", OPT_TENSION, "W", "of legs and of the paths of end points (closed: of all) by z; default 0.01"},
     {"knot-tolerance", OPT_KNOT_TOLERANCE, "T",
      "knots of different contours nearer than this part of the domain are made equal;\ndefault 1e-12"},
     {"zone", OPT_ZONE, "P", "free part of the spans beside inflections without a partner; default 0.1"},

@@ -8,7 +8,7 @@ batten_loft_options batten_loft_options_default(void) {
   return (batten_loft_options){.struct_size = sizeof(batten_loft_options),
                                .degree_z_max = BATTEN_SURFACE_DEGREE_MAX,
                                .knot_tolerance = 1e-12,
-                               .tension = 0.001,
+                               .tension = 0.01,
                                .samples = 20,
                                .rounds = 6,
                                .margin = 0.01,

@@ -39,7 +39,7 @@ typedef struct batten_loft_options {
   double tension; /* of the legs of sections' polygons and the trajectories of first and last control points (closed:
                      of all), against their bending by z, >= 0; does not depend on units. More: smoother from contour
                      to contour, but with more to put right in the sections between. Less than 1e-6 counts as that: it
-                     must leave one surface. Default 0.001. */
+                     must leave one surface. Default 0.01. */
   unsigned samples; /* S of eq. 12: heights in a patch at which legs are compared, >= degree_z. Default 20. */
 
   /* The inequalities. */
