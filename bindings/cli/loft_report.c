@@ -45,6 +45,7 @@ static void report_surface(const batten_loft_info *i, cli_report *r) {
   cli_report_count(r, "rows_used", i->rows_used);
   cli_report_count(r, "rounds", i->rounds);
   cli_report_count(r, "iterations", i->iterations);
+  cli_report_bool(r, "settled", i->settled != 0);
   cli_report_number(r, "objective", i->objective);
   cli_report_number(r, "objective_unconstrained", i->objective_unconstrained);
   cli_report_number(r, "interpolation_error", i->interpolation_error);

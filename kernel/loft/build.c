@@ -288,6 +288,7 @@ static batten_status describe(build *b, unsigned degree) {
   i->rows = a->result.rows;
   i->rows_used = a->result.rows_used;
   i->rounds = b->rounds;
+  i->settled = a->result.settled;
   i->iterations = b->iterations;
   i->inflections = s->inflections;
   i->inflections_unmatched = s->unmatched;

@@ -313,6 +313,7 @@ typedef struct loft_result {
   loft_elastic *elastic; /* those that do not, largest first; batten's */
   size_t rows, rows_used, iterations;
   unsigned rounds;
+  bool settled; /* the turns were settled: programs left vertices, or there were too many */
 } loft_result;
 /* From the minimum without inequalities (free [unknowns][2]): separators from the last surface, a program, and so on;
  * finer inequalities where these are too strict. Fails: NOMEM, TOO_LARGE (row_limit), CANCELLED. */

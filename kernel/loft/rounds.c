@@ -315,6 +315,7 @@ static batten_status settle(work *w) {
   double shortage = whole_shortage(w, w->control, NULL);
   if (shortage < w->shortage_best) take(w, loft_objective_value(w->objective, w->y), shortage);
   w->feasible = feasible;
+  w->result.settled = true;
   return BATTEN_OK;
 }
 
