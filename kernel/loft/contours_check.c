@@ -174,14 +174,15 @@ static double agreement(const course *a, const course *b, bool reversed) {
   return sum / CHORDS;
 }
 
-/* Closed ones: around opposite sides, beyond what figures of eight leave of an area. Open ones: the second one's
+/* Closed ones: around opposite sides, beyond what figures of eight leave of an area, and turning so (lines that cross
+ * themselves may enclose more of the other side). Open ones: the second one's
  * chords fit those of the first better when it is reversed, and do not fit as they are; where both bend to the same
  * side on the whole they are not reversed but turned (reversing makes left bends right ones). */
 static bool run_against(bool closed, const course *a, const course *b) {
   static const double ROUND = 1e-3, BENT = 0.5, FITS = 0.25;
   if (closed)
-    return a->area * b->area < 0 && fabs(a->area) > ROUND * a->length * a->length &&
-           fabs(b->area) > ROUND * b->length * b->length;
+    return a->area * b->area < 0 && a->turn * b->turn < 0 && fmin(fabs(a->turn), fabs(b->turn)) > BENT &&
+           fabs(a->area) > ROUND * a->length * a->length && fabs(b->area) > ROUND * b->length * b->length;
   bool same_side = a->turn * b->turn > 0 && fmin(fabs(a->turn), fabs(b->turn)) > BENT;
   double as_is = agreement(a, b, false);
   return !same_side && as_is < FITS && agreement(a, b, true) > as_is;

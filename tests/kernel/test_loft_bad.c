@@ -1,5 +1,6 @@
 /* Contours that no surface can go through: errors that name what is wrong, and what to do. */
 #include "../../kernel/loft/loft_inner.h"
+#include "loft_scenes.h"
 #include "tap.h"
 
 /* Cubic arcs over [0, 1]: knots 0.25, 0.5, 0.75 as often as `fold` says. */
@@ -142,6 +143,16 @@ static void test_directions(batten_context *ctx) {
            "contours[2]: runs against contours[1], one clockwise and the other counter-clockwise; reverse it");
   batten_curve_free(other);
   batten_curve_free(ring);
+  /* Loops beyond crossings can enclose more than the rest: the areas of the last two differ in sign, their turns do
+   * not. */
+  loft_rule rule = loft_rule_random(466);
+  loft_scene s = loft_scene_make(ctx, &rule);
+  batten_loft *loft = NULL;
+  batten_status st =
+      batten_loft_build(ctx, s.count, (const batten_curve *const *)s.contours, s.heights, NULL, &loft, NULL, NULL);
+  T_CHECK(st >= 0, "closed contours that cross themselves: %s", st ? batten_error(ctx) : "");
+  batten_loft_free(loft);
+  loft_scene_free(&s);
 }
 
 static void test_slopes(batten_context *ctx, const batten_curve *arc) {
