@@ -201,7 +201,7 @@ static batten_status whole(batten_context *ctx, void *arg) {
 }
 
 int main(void) {
-  loft_rule paper = {.kind = LOFT_PAPER}, many = loft_rule_random(66);
+  loft_rule paper = {.kind = LOFT_PAPER}, many = loft_rule_random(170);
   test_nothing_to_do();
   test_paper();
   test_stacks();
