@@ -65,12 +65,13 @@ typedef struct loft_scene {
                                high beside its contours that nothing could be told apart; then the caption says it */
 } loft_scene;
 
-/* After figure 5 of the paper: the control polygons of the sections, with the control points of their trajectories in
- * grey; the contours and sections between them, with the control polygons of the contours in grey; the surface, blue
- * where its Gaussian curvature is positive, red where it is negative; the surface in the same colours by the
+/* After figure 5 of the paper: the control polygons of the sections, with the control points of their trajectories
+ * in grey; the contours and sections between them, with the control polygons of the contours in grey; the surface,
+ * blue where its Gaussian curvature is positive, red where it is negative; the surface in the same colours by the
  * curvature of its sections, blue to the side to which most of it bends, with red lines between both. Of stacks of
- * many contours not all have lines. Two rows and two columns; with unconstrained two rows and four columns. view
- * size, camera, up_axis and title of the picture; its other fields do not count path  .png */
+ * many contours not all have lines. Two rows and two columns; with unconstrained two rows and four columns.
+ *   view  size, camera, up_axis and title of the picture; its other fields do not count
+ *   path  .png */
 batten_status loft_draw(batten_context *ctx, const loft_scene *scene, const batten_picture_options *view,
                         const char *path);
 

@@ -90,16 +90,19 @@ typedef struct batten_loft_info {
   double time_prepare_s, time_objective_s, time_rows_s, time_qp_s, time_check_s;
 } batten_loft_info;
 
-/* A loft through contours [count] at heights [count], ascending; count >= 2. All contours open, or all closed; over
- * one domain; degree 2 .. BATTEN_CURVE_DEGREE_MAX (lower ones are raised to the highest); none crosses the next one's
- * direction. Where there is no solution, these are tried in order until there is one: new separators, finer
- * inequalities (where few vertices of the polygons fail), Newton's method on the turns themselves, degree n + 1 and
- * so on, more knots next to the vertices that have none; the latter two only as long as fewer vertices fail for it.
- * Then inequalities of single vertices give way (elastic) as little as possible, and are named. unconstrained  NULL,
- * or a new loft: the minimum without inequalities, of the same degree and knots, to compare with info           NULL,
- * or the figures Progress phases: "contours", "objective", "quadratic program", "certify". BATTEN_OK          proven
- * on all sign_pairs BATTEN_W_ACCURACY  not proven; the text says where Same bits for any number of threads, and for
- * points or heights scaled by a power of two. Cost: about linear in patches x knots, where few inequalities matter.
+/* A loft through contours [count] at heights [count], ascending; count >= 2. All contours open, or all closed;
+ * over one domain; degree 2 .. BATTEN_CURVE_DEGREE_MAX (lower ones are raised to the highest); none runs against
+ * the next. Where there is no solution, these are tried in order until there is one: new separators, finer
+ * inequalities (where few vertices of the polygons fail), Newton's method on the turns themselves, degree n + 1
+ * and so on, more knots next to the vertices that have none; the latter two only as long as fewer vertices fail for
+ * it. Then inequalities of single vertices give way (elastic) as little as possible, and are named.
+ *   unconstrained  NULL, or a new loft: the minimum without inequalities, same degree and knots, to compare with
+ *   info           NULL, or the figures
+ * Progress phases: "contours", "objective", "quadratic program", "certify".
+ * BATTEN_OK          proven on all sign_pairs
+ * BATTEN_W_ACCURACY  not proven; the text says where
+ * Same bits for any number of threads, and for points or heights scaled by a power of two. Cost: about linear in
+ * patches x knots, where few inequalities matter.
  * Fails: INVALID (heights that do not ascend, contours that are degenerate, differ in domain, are open and closed,
  * not smooth enough, or run in opposite directions: named, with what to do), NOMEM, TOO_LARGE, CANCELLED. */
 BATTEN_API batten_status batten_loft_build(batten_context *ctx, size_t count, const batten_curve *const *contours,
