@@ -130,6 +130,7 @@ static void use_words(char *text, size_t size) {
       {"opt.normals", "normals in the file"},
       {"opt.spline.smoothing", "--smoothing"},
       {"opt.fit.", "opt."},
+      {"see batten_loft_notes", "see remark in the report"},
       {"memory_limit", "--memory"},
       {"opt.width, opt.height", "--size"},
       {", or opt.improve larger than 0", ""},

@@ -262,6 +262,26 @@ static batten_status add_notes(build *b) {
   return BATTEN_OK;
 }
 
+/* Whether both contours of some patch bend to one side over a span, as far as their polygons tell. */
+static bool seem_to_bend(const build *b) {
+  static const double CLEARLY = 1e-3; /* radians */
+  for (size_t i = 0; i < b->patches; i++) {
+    const loft_slab *slab = &b->best_slabs[i];
+    size_t vertices = loft_vertices(&slab->space);
+    for (size_t k = 0; k < slab->space.spans; k++) {
+      double least = INFINITY, most = -INFINITY;
+      for (size_t v = slab->space.first[k]; v <= slab->space.first[k] + slab->space.degree - 2; v++)
+        for (unsigned end = 0; end < 2; end++) {
+          double turn = loft_turn(slab, end, v % vertices);
+          least = isnan(turn) ? -INFINITY : fmin(least, turn);
+          most = isnan(turn) ? INFINITY : fmax(most, turn);
+        }
+      if (least > CLEARLY || most < -CLEARLY) return true;
+    }
+  }
+  return false;
+}
+
 static batten_status describe(build *b, unsigned degree) {
   const attempt *a = &b->best;
   const loft_stack *s = &b->stack;
@@ -298,7 +318,8 @@ static batten_status describe(build *b, unsigned degree) {
   i->sign_pairs_free = a->proof.free;
   i->sign_violations = a->proof.violations;
   i->sign_violations_unconstrained = unconstrained.violations;
-  i->certified = a->proof.certified;
+  /* A proof of nothing is none, where there is something to prove. */
+  i->certified = a->proof.certified && (a->proof.pairs > 0 || !seem_to_bend(b));
   i->margin_min = a->proof.margin;
   i->worst_patch = a->proof.worst_patch;
   memcpy(i->worst_at, a->proof.worst_at, sizeof i->worst_at);
@@ -311,10 +332,17 @@ static batten_status describe(build *b, unsigned degree) {
 static batten_status judge(const build *b) {
   const batten_loft_info *i = &b->info;
   if (i->certified) return BATTEN_OK;
+  if (i->sign_pairs == 0)
+    return batten_fail(
+        b->ctx, BATTEN_W_ACCURACY,
+        "no span pair could be shown to bend to one side, though contours seem to: nothing is proven of "
+        "the sections; rounding hides how they bend where neighbouring contours differ a lot in size or "
+        "lie far from the origin");
   return batten_fail(
       b->ctx, BATTEN_W_ACCURACY,
       "sections are not proven to keep the contours' signs in %zu of %zu span pairs, worst in patch %zu "
-      "(between contours %zu and %zu) near t = %g, z = %g; put a contour between these two, or give them "
+      "(between contours %zu and %zu) near t = %g, z = %g; see batten_loft_notes, put a contour between these two, "
+      "or give them "
       "knots that lie nearer to each other",
       missing(&b->best.proof), i->sign_pairs, i->worst_patch, i->worst_patch, i->worst_patch + 1, i->worst_at[0],
       i->worst_at[1]);

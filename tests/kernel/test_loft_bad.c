@@ -180,6 +180,30 @@ static void test_slopes(batten_context *ctx, const batten_curve *arc) {
   for (size_t k = 0; k < 5; k++) batten_curve_free(curves[k]);
 }
 
+/* A proof of nothing is no success where contours bend; where none does there is nothing to prove. */
+static void test_nothing_proven(batten_context *ctx) {
+  const double heights[3] = {0, 1, 2}, small[4] = {1e-9, 0, 0, 1e-9};
+  const double knots[] = {0, 0, 0, 0.5, 1, 1, 1}, line[] = {0, 0, 1, 0, 2, 0, 3, 0};
+  batten_curve *ring = make_ring(ctx, 1, 0), *tiny = NULL, *straight = NULL;
+  T_OK(batten_curve_transform(ctx, ring, small, NULL, NULL, &tiny), ctx);
+  T_OK(batten_curve_create(ctx, &(batten_curve_form){2, 7, knots, line, 0}, &straight), ctx);
+  const batten_curve *rings[3] = {ring, tiny, ring}, *lines[3] = {straight, straight, straight};
+  batten_loft *loft = NULL;
+  batten_loft_info info;
+  T_STATUS(batten_loft_build(ctx, 3, rings, heights, NULL, &loft, NULL, &info), BATTEN_W_ACCURACY, ctx,
+           "nothing is proven of the sections");
+  T_CHECK(info.sign_pairs == 0 && !info.certified, "%zu pairs beside a contour of 1e-9, and no proof",
+          info.sign_pairs);
+  batten_loft_free(loft);
+  loft = NULL;
+  T_OK(batten_loft_build(ctx, 3, lines, heights, NULL, &loft, NULL, &info), ctx);
+  T_CHECK(info.sign_pairs == 0, "straight contours have no sign to keep");
+  batten_loft_free(loft);
+  batten_curve_free(straight);
+  batten_curve_free(tiny);
+  batten_curve_free(ring);
+}
+
 int main(void) {
   batten_context *ctx = t_context(NULL, NULL, 1);
   batten_curve *arc = make_arc(ctx, 3, 1, 3, 0);
@@ -188,6 +212,7 @@ int main(void) {
   test_smoothness(ctx, arc);
   test_directions(ctx);
   test_slopes(ctx, arc);
+  test_nothing_proven(ctx);
   batten_curve_free(arc);
   T_CHECK(batten_bytes_in_use(ctx) == 0, "nothing is left");
   batten_context_free(ctx);

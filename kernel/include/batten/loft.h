@@ -81,7 +81,7 @@ typedef struct batten_loft_info {
   size_t sign_violations_unconstrained; /* such pairs in which sections of the surface without inequalities have the
                                            wrong sign somewhere */
   size_t sign_violations;               /* the same of the result */
-  int certified;                        /* non-zero: all of them are proven */
+  int certified;                        /* non-zero: all of them are proven, and there are some where contours bend */
   double margin_min; /* proven: the least of (curvature with its sign) over these pairs where no flat point bounds the
                         span, 1 / unit; when not certified the least that was met */
   size_t worst_patch;
@@ -100,7 +100,8 @@ typedef struct batten_loft_info {
  *   info           NULL, or the figures
  * Progress phases: "contours", "objective", "quadratic program", "certify".
  * BATTEN_OK          proven on all sign_pairs
- * BATTEN_W_ACCURACY  not proven; the text says where
+ * BATTEN_W_ACCURACY  not proven; the text says where. Also when there are no sign_pairs though contours bend, since
+ *                    rounding hides how
  * Same bits for any number of threads, and for points or heights scaled by a power of two. Cost: about linear in
  * patches x knots, where few inequalities matter.
  * Fails: INVALID (heights that do not ascend, contours that are degenerate, differ in domain, are open and closed,
