@@ -54,7 +54,9 @@ static inline batten_status shape_evaluate(const void *user, batten_context *ctx
   return BATTEN_OK;
 }
 
-static inline batten_field shape_field(shape *s) { return (batten_field){3, 1, shape_evaluate, s}; }
+static inline batten_field shape_field(shape *s) {
+  return (batten_field){.dimension = 3, .order = 1, .evaluate = shape_evaluate, .user = s};
+}
 
 /* ---- shapes ------------------------------------------------------------------------------------- */
 

@@ -67,7 +67,7 @@ static batten_polygonize_options options(double cell) {
 
 static batten_outline *trace(plane_function function, unsigned order, double cell, batten_polygonize_info *info) {
   plane p = {.function = function};
-  batten_field field = {2, order, plane_evaluate, &p};
+  batten_field field = {.dimension = 2, .order = order, .evaluate = plane_evaluate, .user = &p};
   batten_polygonize_options o = options(cell);
   batten_outline *outline = NULL;
   T_OK(batten_trace_outline(ctx, &field, 5, some_seeds, &o, &outline, info), ctx);
@@ -160,7 +160,7 @@ static void test_convergence(void) {
 
 static void test_clipped(void) {
   plane p = {.function = disk};
-  batten_field field = {2, 1, plane_evaluate, &p};
+  batten_field field = {.dimension = 2, .order = 1, .evaluate = plane_evaluate, .user = &p};
   batten_polygonize_options o = options(0.05);
   o.lower[0] = -0.5;
   batten_outline *outline = NULL;
@@ -181,7 +181,8 @@ static void test_clipped(void) {
 
 static void test_refusals(void) {
   plane p = {.function = disk};
-  batten_field field = {2, 1, plane_evaluate, &p}, solid = {3, 1, plane_evaluate, &p};
+  batten_field field = {.dimension = 2, .order = 1, .evaluate = plane_evaluate, .user = &p},
+               solid = {.dimension = 3, .order = 1, .evaluate = plane_evaluate, .user = &p};
   batten_polygonize_options o = options(0.05);
   batten_outline *out = NULL;
   T_CHECK(batten_trace_outline(NULL, &field, 5, some_seeds, &o, &out, NULL) == BATTEN_E_INVALID, "no context");
@@ -215,7 +216,7 @@ static void test_refusals(void) {
 static batten_status call_trace(batten_context *c, void *arg) {
   (void)arg;
   plane p = {.function = annulus};
-  batten_field field = {2, 0, plane_evaluate, &p};
+  batten_field field = {.dimension = 2, .order = 0, .evaluate = plane_evaluate, .user = &p};
   batten_polygonize_options o = options(0.2);
   batten_outline *outline = NULL;
   batten_status st = batten_trace_outline(c, &field, 5, some_seeds, &o, &outline, NULL);

@@ -9,6 +9,7 @@
 #include <batten/convex.h>
 #include <batten/curve.h>
 #include <batten/field.h>
+#include <batten/frep.h>
 #include <batten/loft.h>
 #include <batten/lsq.h>
 #include <batten/matrix.h>
@@ -18,6 +19,7 @@
 #include <batten/saddle.h>
 #include <batten/solid.h>
 #include <batten/spline.h>
+#include <batten/stack.h>
 #include <batten/surface.h>
 
 #endif

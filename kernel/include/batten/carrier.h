@@ -73,6 +73,10 @@ BATTEN_API batten_status batten_carrier_fit(batten_context *ctx, unsigned n, siz
 BATTEN_API batten_status batten_carrier_evaluate(batten_context *ctx, const batten_carrier *c, size_t count,
                                                  const double *points, double *values, double *gradients,
                                                  double *hessians);
+/* Bounds of f_c over boxes, as batten_field says: boxes [count][2][n], ranges [count][2]; of CALLBACK those of the host's
+ * field, else -INFINITY, INFINITY. */
+BATTEN_API batten_status batten_carrier_bounds(batten_context *ctx, const batten_carrier *c, size_t count,
+                                               const double *boxes, double *ranges);
 BATTEN_API batten_field batten_carrier_field(const batten_carrier *c);
 
 /* For saving: kind, its numbers in the order of the constructor's arguments (rotations spelled out), children.

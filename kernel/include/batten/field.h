@@ -19,6 +19,11 @@ typedef struct batten_field {
   batten_status (*evaluate)(const void *user, batten_context *ctx, size_t count, const double *points,
                             double *values, double *gradients, double *hessians);
   const void *user;
+  /* Bounds over boxes, or NULL. boxes [count][2][n]: lower and upper corners, finite, lower <= upper; ranges [count][2]:
+   * evaluate gives no value outside of [lo, hi] at any point of the box; -INFINITY, INFINITY where nothing is known.
+   * Narrow boxes should have narrow ranges. The polygoniser finds surfaces by it without seeds and leaves out empty
+   * space. */
+  batten_status (*bounds)(const void *user, batten_context *ctx, size_t count, const double *boxes, double *ranges);
 } batten_field;
 
 #ifdef __cplusplus

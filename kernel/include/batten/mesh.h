@@ -172,6 +172,8 @@ typedef struct batten_polygonize_info {
  * without a seed are not found, by design. A mesh that crosses itself is made again on a lattice of half, then a
  * quarter of the cell (and then half the edges). Same bits for any order of the seeds and any number of threads.
  *   field   three-dimensional; order 0 costs six evaluations for a gradient
+ *   seeds   NULL with seed_count 0, opt.lower and opt.upper given, and a field with bounds: the whole surface in the box
+ *           is found (batten_find_seeds with the cell)
  *   Progress phases: "surface", "improve", "settle".
  * Positive status: BATTEN_W_ACCURACY (accuracy is missed, or the mesh crosses itself), BATTEN_W_CLIPPED.
  * Fails: INVALID (also: the field is not finite somewhere, the text names the point), NOMEM, TOO_LARGE (cells,
@@ -180,6 +182,15 @@ typedef struct batten_polygonize_info {
 BATTEN_API batten_status batten_polygonize(batten_context *ctx, const batten_field *field, size_t seed_count,
                                            const double *seeds, const batten_polygonize_options *opt,
                                            batten_mesh **out, batten_polygonize_info *info);
+
+/* Points beside the surface f = 0 in a box, from the field's bounds alone: boxes whose bounds have one sign are left out,
+ * the others halved until they are no larger than `cell`, and where neighbouring corners of these differ in sign there is a
+ * seed. So no part of the surface is missed that the corners of cells of that size show. *seeds [*count][n] is freed by
+ * batten_free(ctx, *seeds). n = 2 or 3. Cost: the cells near the surface. Progress phase "search". Fails: INVALID (the
+ * field has no bounds, box, cell), NOT_FOUND (no sign changes: all inside, or all outside), TOO_LARGE, NOMEM, CANCELLED,
+ * as the field fails. */
+BATTEN_API batten_status batten_find_seeds(batten_context *ctx, const batten_field *field, const double *lower,
+                                           const double *upper, double cell, size_t *count, double **seeds);
 
 /* ---- the outline f = 0 in the plane ------------------------------------------------------------- */
 

@@ -16,6 +16,13 @@ extern "C" {
 
 typedef struct batten_solid batten_solid;
 
+/* What a solid is made of: all kinds are evaluated, meshed, saved and taken as carriers alike. */
+typedef enum batten_solid_kind {
+  BATTEN_SOLID_SPLINE = 0, /* a volume spline under a carrier: this header */
+  BATTEN_SOLID_STACK,      /* planar sections: <batten/stack.h> */
+  BATTEN_SOLID_TREE        /* the algebra of solids: <batten/frep.h> */
+} batten_solid_kind;
+
 typedef enum batten_orientation {
   BATTEN_ORIENT_AUTO = 0, /* check; cure from given normals, else from estimated ones, only where needed: where the
                              check asks for it, and where most points lie in lines far apart (planar cuts) */
@@ -121,16 +128,21 @@ BATTEN_API batten_status batten_solid_create(batten_context *ctx, batten_spline 
                                              const double *points, batten_solid **out);
 
 /* f = sign (f_c - U), its gradient and Hessian; arrays as batten_spline_evaluate. Takes as much memory again as it
- * returns. */
+ * returns. Hessians of stacks and trees are central differences of gradients, with steps of 1e-5 of the box's
+ * diagonal. */
 BATTEN_API batten_status batten_solid_evaluate(batten_context *ctx, const batten_solid *s, size_t count,
                                                const double *points, double *values, double *gradients,
                                                double *hessians);
-BATTEN_API batten_field batten_solid_field(const batten_solid *s);
+/* Bounds of f over boxes, as batten_field says: boxes [count][2][n], ranges [count][2]. */
+BATTEN_API batten_status batten_solid_bounds(batten_context *ctx, const batten_solid *s, size_t count,
+                                             const double *boxes, double *ranges);
+BATTEN_API batten_field batten_solid_field(const batten_solid *s); /* with bounds */
 
 BATTEN_API unsigned batten_solid_dimension(const batten_solid *s);
-BATTEN_API batten_spline *batten_solid_spline(const batten_solid *s);   /* not retained */
-BATTEN_API batten_carrier *batten_solid_carrier(const batten_solid *s); /* not retained */
-BATTEN_API int batten_solid_sign(const batten_solid *s);
+BATTEN_API batten_solid_kind batten_solid_kind_of(const batten_solid *s);
+BATTEN_API batten_spline *batten_solid_spline(const batten_solid *s);   /* not retained; NULL of other kinds */
+BATTEN_API batten_carrier *batten_solid_carrier(const batten_solid *s); /* not retained; NULL of other kinds */
+BATTEN_API int batten_solid_sign(const batten_solid *s);                /* 1 of other kinds */
 BATTEN_API void batten_solid_box(const batten_solid *s, double *lower, double *upper); /* [n] of the data */
 
 /* The data points on the surface (not the off-surface pairs): [count][n], seeds for the polygoniser. */

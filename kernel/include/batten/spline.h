@@ -101,6 +101,11 @@ BATTEN_API batten_status batten_spline_evaluate(batten_context *ctx, const batte
                                                 const double *points, double *values, double *gradients,
                                                 double *hessians);
 
+/* Bounds of U over boxes, as batten_field says: boxes [count][2][n], ranges [count][2]. Far centres are taken together
+ * (their sum is expanded about the middle of the box), near ones by themselves: ranges narrow with the boxes. */
+BATTEN_API batten_status batten_spline_bounds(batten_context *ctx, const batten_spline *s, size_t count,
+                                              const double *boxes, double *ranges);
+
 /* The spline as a field; valid as long as the spline. */
 BATTEN_API batten_field batten_spline_field(const batten_spline *s);
 

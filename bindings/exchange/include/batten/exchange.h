@@ -259,6 +259,49 @@ typedef struct batten_contours {
 BATTEN_API batten_status batten_read_contours(batten_context *ctx, const char *path, batten_contours *out);
 BATTEN_API void batten_contours_free(batten_context *ctx, batten_contours *contours);
 
+/* ---- sections of solids, and scenes ---------------------------------------------------------------- */
+
+typedef struct batten_read_sections_options {
+  size_t struct_size;
+  double gap; /* distance of sections of a planar file of several contours, each a section then; 0 = such files are an
+                 error. Default 0. */
+  int points; /* non-zero: points in no order; planes are found in a file of points x y z without contours. Default 0.
+               */
+} batten_read_sections_options;
+BATTEN_API batten_read_sections_options batten_read_sections_options_default(void);
+
+/* Sections as batten_stack_build takes them, by ascending place along the stack. */
+typedef struct batten_section_set {
+  size_t count;
+  batten_section *sections; /* [count], with arrays of their own */
+  size_t deck_count;        /* of tables of offsets: points of the upper edge, else 0 */
+  double *deck;             /* [deck_count][2] x, z by ascending x */
+} batten_section_set;
+
+/* Files of batten_read_contours, their contours put together by planes (parallel ones by height; others by their
+ * nearest neighbours along the way); contours must be closed: one whose ends are farther apart than 3 of its longest
+ * edges... is refused by name (FORMAT), but see below; and .json       {"batten": "sections", "version": 1,
+ * "sections": [{"origin": [3], "rotation": [3][3], "contours":
+ *               [[[x, y], ...], ...]}, ...]}; rotation may be left out
+ *   tables of offsets of hulls: each run of positive half-breadths of a station, with the rows of 0 beside it, is one
+ * contour, mirrored to both sides; open at its upper end it goes straight on by a waterline's distance and is closed
+ *               there, and deck tells the stations' upper ends, at which the caller cuts (an intersection with the
+ * space below) Fails as batten_read_contours. */
+BATTEN_API batten_status batten_read_sections(batten_context *ctx, const char *path,
+                                              const batten_read_sections_options *opt, batten_section_set *out);
+BATTEN_API void batten_section_set_free(batten_context *ctx, batten_section_set *set);
+/* .json as above: reads back to the same bits. */
+BATTEN_API batten_status batten_write_sections(batten_context *ctx, size_t count, const batten_section *sections,
+                                               const char *path);
+
+/* Trees of the algebra: {"batten": "frep", "version": 1, "nodes": {NAME: NODE, ...}, "root": NODE}; NODE is the name
+ * of one of `nodes` or an object {"node": KIND, ...} with the arguments of KIND's constructor in <batten/frep.h>; see
+ * docs/files.md. Solids as leaves are inline or {"node": "solid", "file": "heart.json"}, beside the scene. Nodes that
+ * stand in several places are saved once. Loading names the place: "scene.json: root.b.radius: ...", cycles and
+ * unknown names among them (FORMAT). */
+BATTEN_API batten_status batten_save_frep(batten_context *ctx, const batten_frep *tree, const char *path);
+BATTEN_API batten_status batten_load_frep(batten_context *ctx, const char *path, batten_frep **out);
+
 typedef struct batten_write_curves_options {
   size_t struct_size;
   const batten_plane *planes; /* [count] where the curves lie; NULL = z = 0. Default NULL. */

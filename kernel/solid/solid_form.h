@@ -1,0 +1,27 @@
+/* How other parts of the kernel make solids of their own form: a solid is a spline under a carrier, or has a form
+ * whose functions evaluate it. Everything that takes a batten_solid takes them alike. */
+#ifndef BATTEN_SOLID_FORM_H
+#define BATTEN_SOLID_FORM_H
+
+#include <batten/solid.h>
+
+typedef struct solid_form {
+  batten_solid_kind kind;
+  unsigned order; /* 1 or 2: derivatives that evaluate supplies; Hessians beyond are differences of gradients */
+  /* As batten_field. hessians NULL when order is 1. */
+  batten_status (*evaluate)(const void *state, batten_context *ctx, size_t count, const double *points,
+                            double *values, double *gradients, double *hessians);
+  batten_status (*bounds)(const void *state, batten_context *ctx, size_t count, const double *boxes, double *ranges);
+  void (*release)(void *state);
+} solid_form;
+
+/* depth: levels of nested carriers and solids below (limits recursion: CARRIER_DEPTH). state goes to the solid, which
+ * releases it; on failure it stays the caller's. lower, upper [n]; points [count][n], at least one, copied. */
+batten_status batten_solid_make(batten_context *ctx, const solid_form *form, void *state, unsigned n, unsigned depth,
+                                const double *lower, const double *upper, size_t count, const double *points,
+                                batten_solid **out);
+/* The state of a solid of this very form, NULL of others. */
+void *batten_solid_state(const batten_solid *s, const solid_form *form);
+unsigned batten_solid_depth(const batten_solid *s);
+
+#endif
