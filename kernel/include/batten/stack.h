@@ -181,6 +181,7 @@ typedef struct batten_stack_parts {
   const double *scales;           /* [count] */
   const double *saturations;      /* [count] w_i, INFINITY = none */
   const double *angular_velocity; /* [count][3] or NULL */
+  batten_section_method method;    /* POINTS, CARRIER: a section's one contour is its points, in no order */
   batten_stack_between between;
   double shape;
   batten_stack_end ends[2];
