@@ -55,6 +55,14 @@ const bx_carrier_layout *bx_layout_named(const char *kind_name) {
 
 /* Before a file is opened: is there a callback? The kernel nests no deeper than BX_CARRIER_DEPTH, so this recursion,
  * and that of writing, goes no deeper either. */
+static batten_status check_carrier(batten_context *ctx, const batten_carrier *carrier);
+
+static batten_status check_solid(batten_context *ctx, const batten_solid *solid) {
+  if (batten_solid_kind_of(solid) == BATTEN_SOLID_SPLINE) return check_carrier(ctx, batten_solid_carrier(solid));
+  return batten_fail(ctx, BATTEN_E_INVALID,
+                     "solid: of sections or other solids; only a solid fitted to surface points can be saved");
+}
+
 static batten_status check_carrier(batten_context *ctx, const batten_carrier *carrier) {
   batten_carrier_parts parts;
   batten_carrier_get_parts(carrier, &parts);
@@ -65,7 +73,7 @@ static batten_status check_carrier(batten_context *ctx, const batten_carrier *ca
                        batten_carrier_kind_name(parts.kind));
   batten_status st = BATTEN_OK;
   for (int i = 0; st == BATTEN_OK && i < 2 && parts.children[i]; i++) st = check_carrier(ctx, parts.children[i]);
-  if (st == BATTEN_OK && parts.solid) st = check_carrier(ctx, batten_solid_carrier(parts.solid));
+  if (st == BATTEN_OK && parts.solid) st = check_solid(ctx, parts.solid);
   return st;
 }
 
@@ -170,7 +178,7 @@ static batten_status check_path(batten_context *ctx, const char *path, const voi
 batten_status batten_save_solid(batten_context *ctx, const batten_solid *solid, const char *path) {
   bx_writer w;
   batten_status st = check_path(ctx, path, solid, "solid");
-  if (st == BATTEN_OK) st = check_carrier(ctx, batten_solid_carrier(solid));
+  if (st == BATTEN_OK) st = check_solid(ctx, solid);
   if (st == BATTEN_OK) st = bx_create(&w, ctx, path);
   if (st != BATTEN_OK) return st;
   bx_put_text(&w, "{\"batten\": \"solid\", \"version\": 1,\n");

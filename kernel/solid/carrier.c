@@ -4,6 +4,7 @@
 
 #include "base/checked.h"
 #include "solid/carrier_inner.h"
+#include "solid/solid_form.h"
 
 /* ---- making -------------------------------------------------------------------------------------- */
 
@@ -74,7 +75,9 @@ static batten_status check_direction(batten_context *ctx, const char *name, unsi
 
 static batten_carrier *new_carrier(batten_context *ctx, batten_carrier_kind kind, unsigned n) {
   batten_carrier *c = batten_alloc(ctx, sizeof *c);
-  if (c) *c = (batten_carrier){.ctx = ctx, .owners = 1, .kind = kind, .n = n};
+  if (!c) return NULL;
+  *c = (batten_carrier){.ctx = ctx, .kind = kind, .n = n};
+  atomic_init(&c->owners, 1);
   return c;
 }
 
@@ -278,7 +281,7 @@ batten_status batten_carrier_solid(batten_context *ctx, batten_solid *solid, bat
   batten_status st = check_out(ctx, out);
   if (st < 0) return st;
   if (!solid) return batten_fail(ctx, BATTEN_E_INVALID, "solid: NULL; give a fitted solid");
-  unsigned depth = 1 + batten_solid_carrier(solid)->depth;
+  unsigned depth = 1 + batten_solid_depth(solid);
   if (depth > CARRIER_DEPTH)
     return batten_fail(ctx, BATTEN_E_TOO_LARGE,
                        "solid: nested %u levels deep, %d are allowed; start again from a "
@@ -295,13 +298,13 @@ batten_status batten_carrier_solid(batten_context *ctx, batten_solid *solid, bat
 /* ---- sharing ------------------------------------------------------------------------------------- */
 
 batten_carrier *batten_carrier_retain(batten_carrier *c) {
-  if (c) c->owners++;
+  if (c) atomic_fetch_add(&c->owners, 1);
   return c;
 }
 
 /* Recursion over the children is no deeper than CARRIER_DEPTH. */
 void batten_carrier_free(batten_carrier *c) {
-  if (!c || --c->owners > 0) return;
+  if (!c || atomic_fetch_sub(&c->owners, 1) != 1) return;
   batten_carrier_free(c->children[0]);
   batten_carrier_free(c->children[1]);
   batten_solid_free(c->solid);

@@ -9,6 +9,7 @@
 #include <stdbool.h>
 
 #include "solid/carrier_inner.h"
+#include "solid/differences.h"
 
 typedef struct joint {
   double u, u_f, u_g;
@@ -68,48 +69,9 @@ static batten_status ask(batten_context *ctx, const batten_field *field, size_t 
   return BATTEN_OK;
 }
 
-/* Points of the differences: x +- h e_a for every axis, then, for second differences of values, x +- h e_a +- h e_b
- * for every a < b. Layout per point: [2 n | 4 pairs][n]. */
-static size_t stencil(unsigned n, const double *x, double h, bool mixed, double *at) {
-  size_t made = 0;
-  for (unsigned a = 0; a < n; a++)
-    for (int side = 1; side >= -1; side -= 2, made++) {
-      for (unsigned i = 0; i < n; i++) at[made * n + i] = x[i];
-      at[made * n + a] += side * h;
-    }
-  for (unsigned a = 0; mixed && a < n; a++)
-    for (unsigned b = a + 1; b < n; b++)
-      for (unsigned corner = 0; corner < 4; corner++, made++) {
-        for (unsigned i = 0; i < n; i++) at[made * n + i] = x[i];
-        at[made * n + a] += corner & 1 ? -h : h;
-        at[made * n + b] += corner & 2 ? -h : h;
-      }
-  return made;
-}
-
-static void differences_of_values(unsigned n, double h, double middle, const double *v, double *gradient,
-                                  double *hessian) {
-  for (unsigned a = 0; gradient && a < n; a++) gradient[a] = (v[2 * a] - v[2 * a + 1]) / (2 * h);
-  const double *corner = v + 2 * n;
-  for (unsigned a = 0; hessian && a < n; a++) {
-    hessian[a * n + a] = ((v[2 * a] - middle) - (middle - v[2 * a + 1])) / (h * h);
-    for (unsigned b = a + 1; b < n; b++, corner += 4)
-      hessian[a * n + b] = hessian[b * n + a] = ((corner[0] - corner[1]) - (corner[2] - corner[3])) / (4 * h * h);
-  }
-}
-
-static void differences_of_gradients(unsigned n, double h, const double *g, double *hessian) {
-  for (unsigned a = 0; a < n; a++)
-    for (unsigned b = 0; b < n; b++) {
-      double ab = g[2 * a * n + b] - g[(2 * a + 1) * n + b], ba = g[2 * b * n + a] - g[(2 * b + 1) * n + a];
-      hessian[a * n + b] = (ab + ba) / (4 * h);
-    }
-}
-
 batten_status batten_carrier_call(batten_context *ctx, const batten_carrier *c, size_t count, const double *points,
                                   double *values, double *gradients, double *hessians) {
-  /* The most points about one: n = 3, second differences of values; as many numbers as 6 gradients. */
-  enum { STENCIL = 6 + 12 };
+  enum { STENCIL = DIFFERENCE_POINTS };
   const batten_field *field = &c->field;
   unsigned n = c->n;
   bool direct_gradients = field->order >= 1, direct_hessians = field->order >= 2;
@@ -120,7 +82,7 @@ batten_status batten_carrier_call(batten_context *ctx, const batten_carrier *c, 
   double *answer = at + CARRIER_BLOCK * STENCIL * 3, *middle = answer + CARRIER_BLOCK * STENCIL;
   size_t made = 0, each = 0;
   for (size_t i = 0; i < count; i++)
-    made += each = stencil(n, points + i * n, c->step, hessians && !direct_gradients, at + made * n);
+    made += each = batten_difference_points(n, points + i * n, c->step, hessians && !direct_gradients, at + made * n);
   batten_status st = ask(ctx, field, count, points, middle, direct_gradients ? gradients : NULL, NULL);
   if (st >= 0)
     st = direct_gradients ? ask(ctx, field, made, at, NULL, answer, NULL)
@@ -128,9 +90,9 @@ batten_status batten_carrier_call(batten_context *ctx, const batten_carrier *c, 
   for (size_t i = 0; st >= 0 && i < count; i++) {
     if (values) values[i] = middle[i];
     if (direct_gradients)
-      differences_of_gradients(n, c->step, answer + i * each * n, hessians + i * n * n);
+      batten_differences_of_gradients(n, c->step, answer + i * each * n, hessians + i * n * n);
     else
-      differences_of_values(n, c->step, middle[i], answer + i * each, gradients ? gradients + i * n : NULL,
+      batten_differences_of_values(n, c->step, middle[i], answer + i * each, gradients ? gradients + i * n : NULL,
                             hessians ? hessians + i * n * n : NULL);
   }
   batten_free(ctx, at);

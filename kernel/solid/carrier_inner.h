@@ -5,6 +5,8 @@
 #include <batten/carrier.h>
 #include <batten/solid.h>
 
+#include <stdatomic.h>
+
 enum {
   CARRIER_PARAMETERS = 16, /* most numbers of a kind: an ellipsoid's or box's 3 + 3 + 9 + 1 */
   CARRIER_DEPTH = 64,      /* most levels of unions and intersections: bounds the recursion of an evaluation */
@@ -13,7 +15,7 @@ enum {
 
 struct batten_carrier {
   batten_context *ctx;
-  size_t owners;
+  atomic_size_t owners;
   batten_carrier_kind kind;
   unsigned n, depth;                     /* depth: 0 for a carrier without children */
   double parameters[CARRIER_PARAMETERS]; /* as the constructor got them: what is saved */

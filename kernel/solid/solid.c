@@ -1,8 +1,11 @@
-/* A solid: a spline, a carrier and a sign. Making, sharing, evaluating; the fit is in solid_fit.c. */
+/* A solid: a spline, a carrier and a sign, or a form of another part of the kernel. Making, sharing, evaluating; the fit
+ * is in solid_fit.c. */
 #include <math.h>
 #include <string.h>
 
 #include "base/checked.h"
+#include "solid/carrier_inner.h"
+#include "solid/differences.h"
 #include "solid/solid_inner.h"
 
 /* ---- evaluating ---------------------------------------------------------------------------------- */
@@ -12,17 +15,11 @@ static void combine(int sign, size_t count, const double *carrier, double *out) 
   for (size_t i = 0; i < count; i++) out[i] = sign * (carrier[i] - out[i]);
 }
 
-batten_status batten_solid_evaluate(batten_context *ctx, const batten_solid *s, size_t count, const double *points,
-                                    double *values, double *gradients, double *hessians) {
-  if (!s) return batten_fail(ctx, BATTEN_E_INVALID, "solid: NULL; give a solid");
-  if (count == 0) return BATTEN_OK;
-  size_t n = s->n, bytes;
-  if (!points) return batten_fail(ctx, BATTEN_E_INVALID, "points: NULL; give [%zu][%u] numbers", count, s->n);
-  size_t each = (values ? 1 : 0) + (gradients ? n : 0) + (hessians ? n * n : 0);
-  if (!batten_mul3(count, each, sizeof(double), &bytes))
-    return batten_fail(ctx, BATTEN_E_TOO_LARGE, "count: %zu; too many", count);
+static batten_status evaluate_spline(batten_context *ctx, const batten_solid *s, size_t count, const double *points,
+                                     double *values, double *gradients, double *hessians) {
+  size_t n = s->n, each = (values ? 1 : 0) + (gradients ? n : 0) + (hessians ? n * n : 0);
   /* The carrier goes first, aside: what it says may be an error of the host's. */
-  double *aside = batten_alloc(ctx, bytes), *next = aside;
+  double *aside = batten_alloc_array(ctx, count, each * sizeof *aside), *next = aside;
   if (!aside) return BATTEN_E_NOMEM;
   double *f = values ? next : NULL;
   next += values ? count : 0;
@@ -38,6 +35,53 @@ batten_status batten_solid_evaluate(batten_context *ctx, const batten_solid *s, 
   return st;
 }
 
+/* Hessians of a form that has none, by differences of gradients: block by block, so that memory stays small. */
+static batten_status differ(batten_context *ctx, const batten_solid *s, size_t count, const double *points,
+                            double *hessians) {
+  enum { BLOCK = 1024, AROUND = 6 }; /* points about one: two along each axis */
+  size_t n = s->n;
+  double square = 0;
+  for (size_t k = 0; k < n; k++) square += (s->upper[k] - s->lower[k]) * (s->upper[k] - s->lower[k]);
+  /* 1e-5 balances the error of the difference, h^2, and of rounding, 1e-16 / h. */
+  double h = 1e-5 * (square > 0 ? sqrt(square) : 1);
+  double *at = batten_alloc_array(ctx, BLOCK * AROUND, 2 * n * sizeof *at);
+  if (!at) return BATTEN_E_NOMEM;
+  double *g = at + BLOCK * AROUND * n;
+  batten_status st = BATTEN_OK;
+  for (size_t first = 0; st >= 0 && first < count; first += BLOCK) {
+    size_t now = count - first < BLOCK ? count - first : BLOCK, each = 2 * n;
+    for (size_t i = 0; i < now; i++)
+      batten_difference_points(s->n, points + (first + i) * n, h, false, at + i * each * n);
+    st = s->form->evaluate(s->state, ctx, now * each, at, NULL, g, NULL);
+    for (size_t i = 0; st >= 0 && i < now; i++)
+      batten_differences_of_gradients(s->n, h, g + i * each * n, hessians + (first + i) * n * n);
+  }
+  batten_free(ctx, at);
+  return st;
+}
+
+static batten_status evaluate_form(batten_context *ctx, const batten_solid *s, size_t count, const double *points,
+                                   double *values, double *gradients, double *hessians) {
+  bool direct = s->form->order >= 2;
+  batten_status st = BATTEN_OK;
+  if (values || gradients || direct)
+    st = s->form->evaluate(s->state, ctx, count, points, values, gradients, direct ? hessians : NULL);
+  if (st >= 0 && hessians && !direct) st = differ(ctx, s, count, points, hessians);
+  return st;
+}
+
+batten_status batten_solid_evaluate(batten_context *ctx, const batten_solid *s, size_t count, const double *points,
+                                    double *values, double *gradients, double *hessians) {
+  if (!s) return batten_fail(ctx, BATTEN_E_INVALID, "solid: NULL; give a solid");
+  if (count == 0) return BATTEN_OK;
+  size_t n = s->n, bytes, each = (values ? 1 : 0) + (gradients ? n : 0) + (hessians ? n * n : 0);
+  if (!points) return batten_fail(ctx, BATTEN_E_INVALID, "points: NULL; give [%zu][%u] numbers", count, s->n);
+  if (each == 0) return BATTEN_OK;
+  if (!batten_mul3(count, each, sizeof(double), &bytes))
+    return batten_fail(ctx, BATTEN_E_TOO_LARGE, "count: %zu; too many", count);
+  return (s->form ? evaluate_form : evaluate_spline)(ctx, s, count, points, values, gradients, hessians);
+}
+
 static batten_status evaluate_field(const void *user, batten_context *ctx, size_t count, const double *points,
                                     double *values, double *gradients, double *hessians) {
   return batten_solid_evaluate(ctx, user, count, points, values, gradients, hessians);
@@ -49,24 +93,50 @@ batten_field batten_solid_field(const batten_solid *s) {
 
 /* ---- making -------------------------------------------------------------------------------------- */
 
-batten_status batten_solid_new(batten_context *ctx, batten_spline *spline, batten_carrier *carrier, int sign,
-                               size_t count, const double *points, const double *lower, const double *upper,
-                               batten_solid **out) {
-  batten_spline_parts parts;
-  batten_spline_get_parts(spline, &parts);
+/* A solid with its box and points, and nothing else yet. */
+static batten_status make(batten_context *ctx, unsigned n, const double *lower, const double *upper, size_t count,
+                          const double *points, batten_solid **out) {
   batten_solid *s = batten_alloc(ctx, sizeof *s);
-  double *copy = batten_alloc_array(ctx, count, parts.n * sizeof *copy);
+  double *copy = batten_alloc_array(ctx, count, n * sizeof *copy);
   if (!s || !copy) {
     batten_free(ctx, s);
     batten_free(ctx, copy);
     return BATTEN_E_NOMEM;
   }
-  memcpy(copy, points, count * parts.n * sizeof *copy);
-  *s = (batten_solid){.ctx = ctx, .owners = 1, .n = parts.n, .sign = sign, .count = count, .points = copy};
-  memcpy(s->lower, lower, parts.n * sizeof *lower);
-  memcpy(s->upper, upper, parts.n * sizeof *upper);
+  memcpy(copy, points, count * n * sizeof *copy);
+  *s = (batten_solid){.ctx = ctx, .n = n, .sign = 1, .count = count, .points = copy};
+  atomic_init(&s->owners, 1);
+  memcpy(s->lower, lower, n * sizeof *lower);
+  memcpy(s->upper, upper, n * sizeof *upper);
+  *out = s;
+  return BATTEN_OK;
+}
+
+batten_status batten_solid_new(batten_context *ctx, batten_spline *spline, batten_carrier *carrier, int sign,
+                               size_t count, const double *points, const double *lower, const double *upper,
+                               batten_solid **out) {
+  batten_spline_parts parts;
+  batten_spline_get_parts(spline, &parts);
+  batten_solid *s = NULL;
+  batten_status st = make(ctx, parts.n, lower, upper, count, points, &s);
+  if (st < 0) return st;
+  s->sign = sign;
   s->spline = batten_spline_retain(spline);
   s->carrier = batten_carrier_retain(carrier);
+  s->depth = carrier->depth;
+  *out = s;
+  return BATTEN_OK;
+}
+
+batten_status batten_solid_make(batten_context *ctx, const solid_form *form, void *state, unsigned n, unsigned depth,
+                                const double *lower, const double *upper, size_t count, const double *points,
+                                batten_solid **out) {
+  batten_solid *s = NULL;
+  batten_status st = make(ctx, n, lower, upper, count, points, &s);
+  if (st < 0) return st;
+  s->form = form;
+  s->state = state;
+  s->depth = depth;
   *out = s;
   return BATTEN_OK;
 }
@@ -190,6 +260,10 @@ batten_status batten_solid_with_carrier(batten_context *ctx, const batten_solid 
   unsigned of_carrier = batten_carrier_field(carrier).dimension;
   if (of_carrier != solid->n)
     return batten_fail(ctx, BATTEN_E_INVALID, "carrier: of dimension %u, the solid's is %u", of_carrier, solid->n);
+  if (solid->form)
+    return batten_fail(ctx, BATTEN_E_INVALID,
+                       "solid: of %s, it has no carrier; give a solid that was fitted to surface points",
+                       solid->form->kind == BATTEN_SOLID_STACK ? "sections" : "other solids");
   batten_solid *s = NULL;
   batten_status st = batten_solid_new(ctx, solid->spline, carrier, solid->sign, solid->count, solid->points,
                                       solid->lower, solid->upper, &s);
@@ -210,12 +284,13 @@ batten_status batten_solid_with_carrier(batten_context *ctx, const batten_solid 
 /* ---- sharing and looking ------------------------------------------------------------------------- */
 
 batten_solid *batten_solid_retain(batten_solid *s) {
-  if (s) s->owners++;
+  if (s) atomic_fetch_add(&s->owners, 1);
   return s;
 }
 
 void batten_solid_free(batten_solid *s) {
-  if (!s || --s->owners > 0) return;
+  if (!s || atomic_fetch_sub(&s->owners, 1) != 1) return;
+  if (s->form) s->form->release(s->state);
   batten_spline_free(s->spline);
   batten_carrier_free(s->carrier);
   batten_free(s->ctx, s->points);
@@ -223,9 +298,14 @@ void batten_solid_free(batten_solid *s) {
 }
 
 unsigned batten_solid_dimension(const batten_solid *s) { return s->n; }
+batten_solid_kind batten_solid_kind_of(const batten_solid *s) {
+  return s->form ? s->form->kind : BATTEN_SOLID_SPLINE;
+}
 batten_spline *batten_solid_spline(const batten_solid *s) { return s->spline; }
 batten_carrier *batten_solid_carrier(const batten_solid *s) { return s->carrier; }
 int batten_solid_sign(const batten_solid *s) { return s->sign; }
+void *batten_solid_state(const batten_solid *s, const solid_form *form) { return s->form == form ? s->state : NULL; }
+unsigned batten_solid_depth(const batten_solid *s) { return s->depth; }
 
 void batten_solid_box(const batten_solid *s, double *lower, double *upper) {
   memcpy(lower, s->lower, s->n * sizeof *lower);

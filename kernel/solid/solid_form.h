@@ -20,7 +20,7 @@ typedef struct solid_form {
 batten_status batten_solid_make(batten_context *ctx, const solid_form *form, void *state, unsigned n, unsigned depth,
                                 const double *lower, const double *upper, size_t count, const double *points,
                                 batten_solid **out);
-/* The state of a solid of this very form, NULL of others. */
+/* The state of a solid of this very form (not NULL), NULL of others. */
 void *batten_solid_state(const batten_solid *s, const solid_form *form);
 unsigned batten_solid_depth(const batten_solid *s);
 

@@ -2,17 +2,21 @@
 #ifndef BATTEN_SOLID_INNER_H
 #define BATTEN_SOLID_INNER_H
 
-#include <batten/solid.h>
-
 #include "basis/neighbours.h"
+#include "solid/solid_form.h"
+
+#include <stdatomic.h>
 
 struct batten_solid {
   batten_context *ctx;
-  size_t owners;
+  atomic_size_t owners;
   unsigned n;
+  const solid_form *form; /* NULL: spline under carrier */
+  void *state;            /* of the form */
+  unsigned depth;         /* levels of nested carriers and solids below */
   batten_spline *spline;
   batten_carrier *carrier;
-  int sign;
+  int sign; /* 1 with a form */
   double lower[3], upper[3];
   size_t count;   /* points on the surface */
   double *points; /* [count][n] */
