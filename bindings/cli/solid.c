@@ -16,9 +16,7 @@
 /* ---- command line -------------------------------------------------------------------------------- */
 
 enum {
-  OPT_PICTURE = CLI_KEY_OWN,
-  OPT_SAVE,
-  OPT_CARRIER,
+  OPT_CARRIER = BODY_KEY_OWN,
   OPT_ORDER,
   OPT_SMOOTHING,
   OPT_MERGE,
@@ -26,20 +24,14 @@ enum {
   OPT_ORIENT_DATA,
   OPT_ORIENT_METHOD,
   OPT_METHOD,
-  OPT_LOO, /* last of those that tell how to fit */
-  OPT_CELL,
-  OPT_BOX,
-  OPT_COLOR,
-  OPT_DOTS
+  OPT_LOO
 };
 
 static const cli_option table[] = {
-    {"output", 'o', "FILE",
-     "surface, by extension: .ply .obj .stl .off .vtp .vtu .vtk; outline of plane points:\n"
-     ".svg .csv .xyz .txt .vtp .obj; may be given more than once"},
-    {"picture", OPT_PICTURE, "FILE", "shaded view .png, of plane points .png or .svg"},
+    BODY_OPTION_OUTPUT("; outline of plane points:\n.svg .csv .xyz .txt .vtp .obj; may be given more than once"),
+    {"picture", BODY_KEY_PICTURE, "FILE", "shaded view .png, of plane points .png or .svg"},
     CLI_OPTION_REPORT,
-    {"save", OPT_SAVE, "FILE", "the solid itself, as JSON that batten reads back to the same bits"},
+    BODY_OPTION_SAVE,
     {"carrier", OPT_CARRIER, "WHAT",
      "auto, ball, ellipsoid (fitted to the points), none, or a carrier FILE.json;\n"
      "default auto"},
@@ -52,16 +44,16 @@ static const cli_option table[] = {
     {"orient-data", OPT_ORIENT_DATA, "WHAT", "orientation enters as auto, gradients or pairs; default auto"},
     {"orient-method", OPT_ORIENT_METHOD, "HOW", "estimated by auto, energy or planes; default auto"},
     {"method", OPT_METHOD, "NAME", "linear solver: auto, cholesky, mixed, ldl or qr; default auto"},
-    {"cell", OPT_CELL, "LENGTH",
+    {"cell", BODY_KEY_CELL, "LENGTH",
      "edge length of the mesh; default from the points' spacing, but at most\n1/120 of the diagonal of their box"},
-    {"box", OPT_BOX, "X0,Y0[,Z0],X1,...", "cut the surface at this box; default: the points' box grown by 25 %"},
+    BODY_OPTION_BOX("the points' box grown by 25 %"),
     CLI_OPTION_MEMORY,
     {"loo", OPT_LOO, "N", "leave-one-out errors of N points, all or none; default 256"},
     CLI_OPTION_THREADS,
     CLI_OPTION_VIEW,
     CLI_OPTION_UP,
-    {"color", OPT_COLOR, "WHAT", "colour the picture by none, gradient, mean or gauss (curvature); default none"},
-    {"dots", OPT_DOTS, NULL, "draw the points in the picture"},
+    BODY_OPTION_COLOR,
+    {"dots", BODY_KEY_DOTS, NULL, "draw the points in the picture"},
     CLI_OPTION_SIZE,
     CLI_OPTION_TITLE,
     CLI_OPTION_QUIET,
@@ -134,39 +126,10 @@ static bool take_fit_option(solid_request *q, int key, const char *v) {
   return ok;
 }
 
-static bool take_view_option(solid_request *q, int key, const char *v) {
-  static const char *const colors[] = {"none", "gradient", "mean", "gauss", NULL};
-  int word = 0;
-  switch (key) {
-    case OPT_CELL:
-      return cli_parse_number("--cell", v, 1e-300, INFINITY, &q->surface.cell);
-    case OPT_BOX:
-      q->box = v;
-      return true;
-    case OPT_COLOR:
-      if (!cli_parse_word("--color", v, colors, &word)) return false;
-      q->color = (solid_color)word;
-      return true;
-    case OPT_DOTS:
-      q->dots = true;
-      return true;
-    default:
-      return cli_take_picture(&q->picture, key, v);
-  }
-}
-
 static bool take(cli_request *common, int key, const char *v) {
   solid_request *q = (solid_request *)common;
-  switch (key) {
-    case 'o':
-      return cli_outputs_add(&common->outputs, CLI_OUTPUT_SURFACE, v);
-    case OPT_PICTURE:
-      return cli_outputs_add(&common->outputs, CLI_OUTPUT_PICTURE, v);
-    case OPT_SAVE:
-      return cli_outputs_add(&common->outputs, CLI_OUTPUT_SOLID, v);
-    default:
-      return key >= CLI_KEY_OWN && key <= OPT_LOO ? take_fit_option(q, key, v) : take_view_option(q, key, v);
-  }
+  if (key >= BODY_KEY_OWN) return take_fit_option(q, key, v);
+  return body_take(common, &q->body, key, v);
 }
 
 /* ---- phases -------------------------------------------------------------------------------------- */
@@ -179,32 +142,12 @@ static batten_status read_points(solid_work *w) {
   return st;
 }
 
-static int count_numbers(const char *text) {
-  int n = 1;
-  for (; *text; text++) n += *text == ',';
-  return n;
-}
-
 /* What could not be checked before the dimension was known. */
 static int check_dimension(solid_work *w) {
   solid_request *q = w->request;
   unsigned n = w->cloud.n;
-  if (!cli_outputs_check_dimension(&q->common.outputs, n)) return CLI_USAGE;
-  if (q->box) {
-    double box[6];
-    if (count_numbers(q->box) != (int)(2 * n)) {
-      cli_error("--box: '%s' is not the %u numbers of two corners", q->box, 2 * n);
-      return CLI_USAGE;
-    }
-    if (!cli_parse_numbers("--box", q->box, 2 * n, box)) return CLI_USAGE;
-    for (unsigned k = 0; k < n; k++) {
-      q->surface.lower[k] = box[k];
-      q->surface.upper[k] = box[n + k];
-      if (box[k] < box[n + k]) continue;
-      cli_error("--box: '%s': the first corner must be below the second", q->box);
-      return CLI_USAGE;
-    }
-  }
+  int status = body_check(&w->body, n);
+  if (status != CLI_DONE) return status;
   if (q->fit.orientation == BATTEN_ORIENT_GIVEN && !w->cloud.normals) {
     cli_error("%s: has no normals, which --orientation given needs; use --orientation estimate", q->common.input);
     return CLI_FAILED;
@@ -247,107 +190,49 @@ static batten_status make_carrier(solid_work *w) {
   return BATTEN_OK;
 }
 
-/* The worse of two statuses that both mean done: the first that warns is kept. */
-static void note(solid_work *w, batten_status st) {
-  cli_run_warn(&w->run, st);
-  if (w->status == BATTEN_OK) w->status = st;
-}
-
 static batten_status fit(solid_work *w) {
   batten_solid_options o = w->request->fit;
   o.carrier = w->carrier;
   o.normals = o.orientation == BATTEN_ORIENT_NEVER ? NULL : w->cloud.normals;
   batten_status st =
-      batten_solid_fit(w->run.ctx, w->cloud.n, w->cloud.count, w->cloud.points, &o, &w->solid, &w->info);
-  if (st > 0) note(w, st);
+      batten_solid_fit(w->run.ctx, w->cloud.n, w->cloud.count, w->cloud.points, &o, &w->body.solid, &w->info);
+  body_note(&w->body, st);
   return st;
 }
 
 /* Finer than the library does where points are few: the surface between them is smooth and shall look so. */
 static double default_cell(const solid_work *w) {
   double lower[3] = {0}, upper[3] = {0};
-  batten_solid_box(w->solid, lower, upper);
+  batten_solid_box(w->body.solid, lower, upper);
   double diagonal = hypot(hypot(upper[0] - lower[0], upper[1] - lower[1]), upper[2] - lower[2]);
   if (w->cloud.n == 2) return fmax(w->info.spacing / 10, 2e-4 * diagonal); /* lines are cheap */
   return fmin(fmax(0.7 * w->info.spacing, diagonal / 200), diagonal / 120);
 }
 
-static batten_status make_surface(solid_work *w) {
-  double start = batten_now();
-  batten_context *ctx = w->run.ctx;
-  batten_field field = batten_solid_field(w->solid);
-  size_t count;
-  const double *seeds = batten_solid_points(w->solid, &count);
-  if (w->request->surface.cell == 0) w->request->surface.cell = default_cell(w);
-  batten_status st =
-      w->cloud.n == 2
-          ? batten_trace_outline(ctx, &field, count, seeds, &w->request->surface, &w->outline, &w->surface)
-          : batten_polygonize(ctx, &field, count, seeds, &w->request->surface, &w->mesh, &w->surface);
-  w->time_surface_s = batten_now() - start;
-  if (st > 0) note(w, st);
-  if (st < 0 || !w->mesh) return st;
-  st = batten_mesh_measure(ctx, w->mesh, &w->measures);
-  if (st >= 0) st = batten_mesh_self_intersections(ctx, w->mesh, &w->self_intersections);
-  return st < 0 ? st : solid_add_fields(w);
-}
-
-static batten_status draw(solid_work *w, const char *path) {
-  batten_picture_options o = w->request->picture;
-  size_t count;
-  const double *points = batten_solid_points(w->solid, &count);
-  if (w->request->dots || w->outline) {
-    o.points = points;
-    o.point_count = count;
-  }
-  if (w->outline) return batten_picture_outline(w->run.ctx, w->outline, &o, path);
-  static const char *const labels[] = {NULL, "|grad f|", "mean curvature", "Gaussian curvature"};
-  o.colors = solid_color_values(w);
-  o.color_label = labels[w->request->color];
-  return batten_picture_mesh(w->run.ctx, w->mesh, &o, path);
-}
-
-/* Everything to its staged name, the report last, for it tells the times of the others. */
 static int write_outputs(solid_work *w) {
-  solid_request *q = w->request;
-  double start = batten_now();
-  for (size_t i = 0; i < q->common.outputs.count; i++) {
-    const cli_output *f = &q->common.outputs.items[i];
-    const char *path = f->staged ? f->staged : f->target;
-    batten_status st = BATTEN_OK;
-    if (f->kind == CLI_OUTPUT_SURFACE)
-      st = w->outline ? batten_write_outline(w->run.ctx, w->outline, path)
-                      : batten_write_mesh(w->run.ctx, w->mesh, path);
-    else if (f->kind == CLI_OUTPUT_SOLID)
-      st = batten_save_solid(w->run.ctx, w->solid, path);
-    else if (f->kind == CLI_OUTPUT_PICTURE)
-      st = draw(w, path);
-    if (st < 0) return cli_run_failed(&w->run, st);
-  }
-  w->time_write_s = batten_now() - start;
-  cli_report report;
+  batten_status st = body_write(&w->body);
+  if (st < 0) return cli_run_failed(&w->run, st);
+  cli_report report; /* last: it tells the times of the others */
   cli_report_open(&report);
   solid_report(w, &report);
-  bool ok = cli_report_write(&report, &q->common.outputs);
+  int status = body_finish(&w->body, &report);
   cli_report_close(&report);
-  cli_run_clear(&w->run);
-  if (cli_interrupted()) return cli_run_failed(&w->run, BATTEN_E_CANCELLED);
-  return ok && cli_outputs_commit(&q->common.outputs) ? CLI_DONE : CLI_FAILED;
+  return status;
 }
 
 static void work_free(solid_work *w) {
-  batten_outline_free(w->outline);
-  batten_mesh_free(w->mesh);
-  batten_solid_free(w->solid);
+  body_free(&w->body);
+  batten_solid_free(w->body.solid);
   batten_carrier_free(w->carrier);
   if (w->run.ctx) {
     batten_cloud_free(w->run.ctx, &w->cloud);
-    batten_free(w->run.ctx, w->color);
     cli_run_close(&w->run);
   }
 }
 
 static int work(cli_request *q) {
   solid_work w = {.request = (solid_request *)q};
+  w.body = (body){.request = &w.request->body, .common = q, .run = &w.run};
   if (!cli_run_open(&w.run, q->threads, q->memory, q->quiet)) return CLI_FAILED;
   w.run.input = q->input;
   w.run.outputs = &q->outputs;
@@ -359,7 +244,7 @@ static int work(cli_request *q) {
     st = make_carrier(&w);
   }
   if (st >= 0) st = fit(&w);
-  if (st >= 0) st = make_surface(&w);
+  if (st >= 0) st = body_mesh(&w.body, default_cell(&w));
   status = st < 0 ? cli_run_failed(&w.run, st) : write_outputs(&w);
   if (status == CLI_DONE && !q->quiet && !cli_outputs_to_stdout(&q->outputs)) solid_summary(&w);
 done:
@@ -369,9 +254,6 @@ done:
 
 int cli_solid(int argc, char **argv) {
   static const cli_command command = {"solid", "file of points", table, print_help, take, work};
-  solid_request q = {.carrier = "auto",
-                     .fit = batten_solid_options_default(),
-                     .surface = batten_polygonize_options_default(),
-                     .picture = batten_picture_options_default()};
+  solid_request q = {.carrier = "auto", .fit = batten_solid_options_default(), .body = body_request_default()};
   return cli_command_run(&command, &q.common, argc, argv);
 }
