@@ -1,0 +1,23 @@
+/* The moving frame's path in pieces, for those who need bounds of its motion. */
+#ifndef BATTEN_SECTION_PATH_H
+#define BATTEN_SECTION_PATH_H
+
+#include "section/section_inner.h"
+
+enum { STACK_PATH_PIECES = 4 }; /* in an interval between two sections */
+
+typedef struct stack_piece {
+  double t0, t1;
+  double base[3][3], turn[4][3]; /* M = exp(-[v]x) base with v the Bezier polynomial of these points over the piece */
+  double origin[4][3];           /* Bezier points */
+  interval rate[3];              /* of the angular velocity and of M o', both in the moving frame, over the piece */
+  interval velocity[3];
+  double middle[3], reach; /* the origin stays in this ball */
+} stack_piece;
+
+/* Piece STACK_PATH_PIECES i + j is the j-th between the sections i and i + 1. */
+size_t stack_path_pieces(const stack_path *p, const stack_piece **pieces);
+/* The frame at t, held to the piece's ends. */
+void stack_piece_frame(const stack_piece *piece, double t, stack_frame *out);
+
+#endif
