@@ -6,6 +6,9 @@
 
 #include <batten/exchange.h>
 
+/* bx_read_contours_from, which also tells whether the file is a table of offsets. */
+batten_status bx_parse_contours(bx_reader *r, batten_contours *out, bool *offsets);
+
 /* Takes points in space [starts[count]][3] to the planes in which each contour lies: out [starts[count]][2], planes
  * [count]. Where a coordinate is constant, the others are taken over as they are. FORMAT: the points of a contour lie
  * in no plane, to 1e-6 of its size. */

@@ -48,5 +48,7 @@ batten_status bx_read_network_from(bx_reader *r, batten_network **out);
 batten_status bx_read_surface_from(bx_reader *r, batten_surface **out);
 batten_status bx_read_contours_from(bx_reader *r, batten_contours *out);
 batten_status bx_read_curves_from(bx_reader *r, batten_curves *out);
+batten_status bx_read_sections_from(bx_reader *r, bx_format format, const batten_read_sections_options *opt,
+                                    batten_section_set *out);
 
 #endif

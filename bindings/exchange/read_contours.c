@@ -246,7 +246,7 @@ done:
   return st;
 }
 
-batten_status bx_read_contours_from(bx_reader *r, batten_contours *out) {
+batten_status bx_parse_contours(bx_reader *r, batten_contours *out, bool *offsets) {
   sequences s = {.ctx = r->ctx,
                  .names = {.ctx = r->ctx},
                  .table = {.r = r,
@@ -265,8 +265,14 @@ batten_status bx_read_contours_from(bx_reader *r, batten_contours *out) {
     st = batten_fail(r->ctx, BATTEN_E_FORMAT, "%s: no points in the file", bx_short_path(r->path));
   if (st == BATTEN_OK) st = join_surfaces(&s);
   if (st == BATTEN_OK) st = finish(&s, out);
+  *offsets = s.table.offsets;
   free_sequences(&s);
   return st;
+}
+
+batten_status bx_read_contours_from(bx_reader *r, batten_contours *out) {
+  bool offsets;
+  return bx_parse_contours(r, out, &offsets);
 }
 
 batten_status batten_read_contours(batten_context *ctx, const char *path, batten_contours *out) {

@@ -263,34 +263,43 @@ BATTEN_API void batten_contours_free(batten_context *ctx, batten_contours *conto
 
 typedef struct batten_read_sections_options {
   size_t struct_size;
-  double gap; /* distance of sections of a planar file of several contours, each a section then; 0 = such files are an
-                 error. Default 0. */
-  int points; /* non-zero: points in no order; planes are found in a file of points x y z without contours. Default 0.
-               */
+  double gap; /* of a planar file of several contours, each a section then: their distance, along z. 0 = such files are
+                 an error. Default 0. */
+  int points; /* non-zero: points in no order (text, .ply .obj .off .stl), of which the planes are found. Default 0. */
 } batten_read_sections_options;
 BATTEN_API batten_read_sections_options batten_read_sections_options_default(void);
 
-/* Sections as batten_stack_build takes them, by ascending place along the stack. */
+/* Sections as batten_stack_build takes them, in the order of the stack. */
 typedef struct batten_section_set {
   size_t count;
   batten_section *sections; /* [count], with arrays of their own */
-  size_t deck_count;        /* of tables of offsets: points of the upper edge, else 0 */
-  double *deck;             /* [deck_count][2] x, z by ascending x */
+  size_t deck_count;        /* of tables of offsets: stations that are open above, else 0 */
+  double *deck;             /* [deck_count][2] x and z of their highest points, by ascending x */
 } batten_section_set;
 
-/* Files of batten_read_contours, their contours put together by planes (parallel ones by height; others by their
- * nearest neighbours along the way); contours must be closed: one whose ends are farther apart than 3 of its longest
- * edges... is refused by name (FORMAT), but see below; and .json       {"batten": "sections", "version": 1,
- * "sections": [{"origin": [3], "rotation": [3][3], "contours":
- *               [[[x, y], ...], ...]}, ...]}; rotation may be left out
- *   tables of offsets of hulls: each run of positive half-breadths of a station, with the rows of 0 beside it, is one
- * contour, mirrored to both sides; open at its upper end it goes straight on by a waterline's distance and is closed
- *               there, and deck tells the stations' upper ends, at which the caller cuts (an intersection with the
- * space below) Fails as batten_read_contours. */
+/* Text, as batten_read_contours reads it: contours that lie in one plane (to 2e-6 of the size of all) are a section.
+ *   Parallel planes (to 1e-5 radians) follow each other by height, all with the axes of one of them and the normal
+ *   axes[0] x axes[1]: of planes z = const and x = const by ascending z and x, of y = const by descending y, and all
+ *   numbers stay. Other planes follow each other from neighbour to neighbour, or as they come in the file if that way
+ *   is not longer; each frame is that before it turned as little as possible, its origin the middle of the edges.
+ *   Contours are closed: of three points or more, FORMAT where the first and the last are farther apart than 3 of the
+ *   longest edge. Contours x y are one section, or with opt.gap sections z = 0, gap, 2 gap, ...
+ * Tables of offsets of hulls: each run of positive half-breadths of a station, with the rows of 0 beside it, is a
+ *   contour, mirrored to both sides (a bulb and the bow above it are two; at a single row of 0 between them both end a
+ *   twentieth of a waterline before it). One that is open above goes straight on for two waterlines' distances and is
+ *   closed there; deck tells where it really ends, and the caller cuts there. A side that leans inwards goes on until
+ *   half of its breadth is left at most.
+ * Points in no order, with opt.points: sections of one "contour" each, in the planes that hold three points or more
+ *   across one direction, or else six or more; all points must lie in such planes, to 2e-6 of their size.
+ * .json (also .gz): {"batten": "sections", "version": 1, "sections": [{"origin": [3], "rotation": [3][3], "contours":
+ *   [[[x, y], ...], ...]}, ...]}; rotation may be left out: then it is the identity. All as it stands.
+ * Free with batten_section_set_free. Fails as batten_read_contours; whether contours cross and rotations are some is
+ * for batten_stack_build to tell. */
 BATTEN_API batten_status batten_read_sections(batten_context *ctx, const char *path,
                                               const batten_read_sections_options *opt, batten_section_set *out);
 BATTEN_API void batten_section_set_free(batten_context *ctx, batten_section_set *set);
-/* .json as above: reads back to the same bits. */
+/* .json as above, count >= 1; reads back to the same bits. Fails: IO, INVALID (unknown extension; starts that do not
+ * ascend from 0, numbers that are not finite, named), NOMEM, CANCELLED; what stood under the name is then as it was. */
 BATTEN_API batten_status batten_write_sections(batten_context *ctx, size_t count, const batten_section *sections,
                                                const char *path);
 
