@@ -1,6 +1,7 @@
 /* The map of kernel/frep, and what its parts say to each other.
  *
- * frep.c         nodes: making, sharing, evaluating in batches, bounds, parts
+ * frep.c         nodes: making, sharing, evaluating in batches, bounds
+ * frep_parts.c   the list of all kinds: names, parts, making from parts
  * leaves.c       carriers, solids, ball, cone, polygon, gyroid
  * combine.c      R-functions, min and max, blends, negation, morph
  * distance.c     normalize, offset, shell, noise
@@ -22,8 +23,9 @@
 #include "basis/interval.h"
 
 enum {
-  FREP_DEPTH = 128, /* most levels of a tree: bounds the recursion */
-  FREP_BLOCK = 4096 /* points that go through a tree at a time: leaves thread themselves over so many */
+  FREP_DEPTH = 128,    /* most levels of a tree: bounds the recursion */
+  FREP_BLOCK = 4096,   /* points that go through a tree at a time: leaves thread themselves over so many */
+  FREP_NODES = 1 << 20 /* most nodes that an evaluation passes, shared ones as often as they stand in the tree */
 };
 
 typedef struct frep_class {
@@ -36,8 +38,14 @@ typedef struct frep_class {
   /* count <= FREP_BLOCK boxes. Children by frep_bounds_block. */
   batten_status (*bounds)(const batten_frep *a, batten_context *ctx, size_t count, const double *boxes,
                           double *ranges);
+  /* Upper bounds of |grad f| over count <= FREP_BLOCK boxes, INFINITY where none is known: what a first-order
+   * distance needs of the node below it. Children by frep_slopes_block. NULL: 1 where the node is a distance, else
+   * INFINITY. */
+  batten_status (*slopes)(const batten_frep *a, batten_context *ctx, size_t count, const double *boxes,
+                          double *slopes);
   /* A finite box that holds f >= 0 if the structure tells one, from those of the children: false = none known.
-   * lower, upper [n]. Used as a start, then tightened by bounds. */
+   * lower, upper [n]; lower > upper: the structure tells that there is nothing. Used as a start, then tightened by
+   * bounds. */
   bool (*box)(const batten_frep *a, double *lower, double *upper);
   /* From parts: calls the constructor. */
   batten_status (*create)(batten_context *ctx, const batten_frep_parts *parts, batten_frep **out);
@@ -49,6 +57,7 @@ struct batten_frep {
   atomic_size_t owners;
   const frep_class *cls;
   unsigned n, depth;
+  size_t nodes;        /* of the tree, shared ones as often as they stand in it */
   bool distance;       /* batten_frep_is_distance */
   size_t number_count; /* as in parts */
   double *numbers;
@@ -62,24 +71,35 @@ struct batten_frep {
 };
 
 /* A node with copies of the numbers and starts, and owners of the rest added; depth is set. TOO_LARGE: deeper than
- * FREP_DEPTH. state goes to the node (on failure it stays the caller's). parts: all but kind and n may be empty. */
+ * FREP_DEPTH, or more than FREP_NODES. state goes to the node (on failure it stays the caller's). parts: all but n
+ * may be empty; kind is the class's. */
 batten_status frep_make(batten_context *ctx, const frep_class *cls, const batten_frep_parts *parts, bool distance,
                         void *state, batten_frep **out);
 batten_status frep_evaluate_block(const batten_frep *a, batten_context *ctx, size_t count, const double *points,
                                   double *values, double *gradients);
 batten_status frep_bounds_block(const batten_frep *a, batten_context *ctx, size_t count, const double *boxes,
                                 double *ranges);
+batten_status frep_slopes_block(const batten_frep *a, batten_context *ctx, size_t count, const double *boxes,
+                                double *slopes);
+/* A length and a place to begin with where the structure tells no box: the hull of the boxes that nodes below tell,
+ * maps of space left aside. false = no node tells one. */
+bool frep_hint_box(const batten_frep *a, double *lower, double *upper);
 /* The structural box of a child (class->box or false). */
 bool frep_structural_box(const batten_frep *a, double *lower, double *upper);
 
-/* Checks that every constructor does: texts "a: NULL; give a node", "alpha: 2; give -1 < alpha <= 1 ...", ... */
+/* Checks that every constructor does: texts "a: NULL; give a node", "center[1]: nan; give a finite number", "radius:
+ * -1; give a positive finite number", "axis: its length is 0; give a direction". */
 batten_status frep_check_out(batten_context *ctx, const void *out);
 batten_status frep_check_node(batten_context *ctx, const char *name, const batten_frep *a, unsigned n); /* n 0: any */
 batten_status frep_check_numbers(batten_context *ctx, const char *name, size_t count, const double *values);
 batten_status frep_check_positive(batten_context *ctx, const char *name, double value);
 batten_status frep_check_direction(batten_context *ctx, const char *name, size_t n, const double *v, double *unit);
 
-/* The classes, by file. */
+/* What a class's create begins with where a kind has a fixed count of numbers and children. */
+batten_status frep_check_parts(batten_context *ctx, const batten_frep_parts *parts, size_t number_count,
+                               size_t child_count);
+
+/* The classes, by file; frep_parts.c lists them. */
 extern const frep_class frep_class_carrier, frep_class_solid, frep_class_ball, frep_class_cone, frep_class_polygon,
     frep_class_gyroid;
 extern const frep_class frep_class_union, frep_class_intersection, frep_class_difference, frep_class_negation,

@@ -45,8 +45,9 @@ BATTEN_API batten_status batten_frep_cone(batten_context *ctx, const double a[3]
 /* Signed distance of closed polygons in the plane, parted by even-odd; starts [count + 1], points [..][2]. n = 2. */
 BATTEN_API batten_status batten_frep_polygon(batten_context *ctx, size_t count, const size_t *starts,
                                              const double *points, batten_frep **out);
-/* Rounded regular lattice of rods or sheets: amplitude-free gyroid sin x cos y + ... of the period, as a slab of the
- * thickness, approximately. n = 3. */
+/* Lattice of one sheet: the gyroid G = sin X cos Y + sin Y cos Z + sin Z cos X = 0, X = 2 pi x / period, as a slab of
+ * about the thickness: f = thickness / 2 - |G| period / (2 pi 1.531). 1.531 is the mean slope of G on G = 0, where it is
+ * from 1.414 to 1.732: the slab is from 8 % thicker to 12 % thinner. n = 3. */
 BATTEN_API batten_status batten_frep_gyroid(batten_context *ctx, double period, double thickness, batten_frep **out);
 
 /* ---- set operations and blends ------------------------------------------------------------------- */
@@ -64,8 +65,9 @@ BATTEN_API batten_status batten_frep_combine_all(batten_context *ctx, batten_fre
 /* -f: the complement. */
 BATTEN_API batten_status batten_frep_negation(batten_context *ctx, batten_frep *a, batten_frep **out);
 /* Operation + a0 / (1 + (f / a1)^2 + (g / a2)^2), a of the R-function 0: a0 > 0 adds material, a0 < 0 takes some
- * away; a1, a2 > 0 say how far from either surface. The surface moves by under |a0| / (1 + (d / a1)^2) at the
- * distance d of one part. */
+ * away; a1, a2 > 0 say how far from either surface. Where |g| = d the function changes by at most e = |a0| / (1 + (d /
+ * a2)^2), and the surface f = 0 of a distance moves there by at most 1.71 e where that is under d (by about e where it
+ * is far under); likewise with f and a1. */
 BATTEN_API batten_status batten_frep_blend(batten_context *ctx, batten_frep_operation operation, batten_frep *a,
                                            batten_frep *b, double a0, double a1, double a2, batten_frep **out);
 
