@@ -48,8 +48,8 @@ static bool same_side(const double *p, const double *a, const double *b) {
 
 /* ---- loops as they come -------------------------------------------------------------------------- */
 
-/* Twice the area is summed about the first point, which keeps it exact to rounding of the loop's own size. */
-static double signed_area(const double *points, size_t count) {
+/* About the first point, so that rounding is that of the loop's own size. */
+double polygon_loop_area(size_t count, const double *points) {
   double sum = 0;
   for (size_t i = 1; i + 1 < count; i++) {
     const double *a = points + 2 * i, *b = a + 2;
@@ -72,7 +72,7 @@ static void take_loops(making *m, size_t count, const size_t *starts, const doub
       m->origin[made++] = i;
     }
     while (made > first + 1 && same_place(p->points + 2 * first, p->points + 2 * (made - 1))) made--;
-    double area = signed_area(p->points + 2 * first, made - first);
+    double area = polygon_loop_area(made - first, p->points + 2 * first);
     bool keep = made - first >= 3 && fabs(area) >= min_area;
     if (dropped) dropped[k] = !keep;
     if (!keep) {

@@ -75,6 +75,8 @@ void polygon_distance_bounds(const polygon_set *p, const double lower[2], const 
  * shift is turned round. */
 bool polygon_components_overlap(const polygon_set *a, size_t outer_a, const polygon_set *b, size_t outer_b,
                                 const double *shift, double *share);
+/* Of points [count][2], positive where they run counter-clockwise. */
+double polygon_loop_area(size_t count, const double *points);
 /* Area and centroid of a component. */
 void polygon_component_measure(const polygon_set *p, size_t outer, double *area, double centroid[2]);
 
