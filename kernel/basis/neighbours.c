@@ -107,6 +107,10 @@ static void build(batten_tree *t, const double *points) {
     memcpy(t->points + i * t->n, points + t->index[i] * t->n, t->n * sizeof(double));
 }
 
+void batten_tree_order(const batten_tree *t, size_t *order) {
+  if (t->count) memcpy(order, t->index, t->count * sizeof *order);
+}
+
 static double distance_squared(const batten_tree *t, size_t i, const double *x) {
   double sum = 0;
   for (unsigned d = 0; d < t->n; d++) {

@@ -15,6 +15,10 @@ typedef struct batten_tree batten_tree;
 batten_status batten_tree_new(batten_context *ctx, unsigned n, size_t count, const double *points, batten_tree **out);
 void batten_tree_free(batten_context *ctx, batten_tree *tree);
 
+/* order [count]: the points such that neighbours stand together: halves of it, their halves (the first one the smaller
+ * where they cannot be equal) and so on down to 8 points lie on two sides of a plane. */
+void batten_tree_order(const batten_tree *tree, size_t *order);
+
 /* The k nearest points to x, nearest first: index [k], distance [k]. skip: an index that does not count (SIZE_MAX =
  * none). Returns how many there are, min(k, points without skip). k is meant to be small (insertion into a list). */
 size_t batten_tree_nearest(const batten_tree *tree, const double *x, size_t k, size_t skip, size_t *index,

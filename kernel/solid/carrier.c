@@ -372,8 +372,14 @@ static batten_status evaluate_field(const void *user, batten_context *ctx, size_
   return batten_carrier_evaluate(ctx, user, count, points, values, gradients, hessians);
 }
 
+static batten_status bounds_of_field(const void *user, batten_context *ctx, size_t count, const double *boxes,
+                                     double *ranges) {
+  return batten_carrier_bounds(ctx, user, count, boxes, ranges);
+}
+
 batten_field batten_carrier_field(const batten_carrier *c) {
-  return (batten_field){.dimension = c->n, .order = 2, .evaluate = evaluate_field, .user = c};
+  return (batten_field){
+      .dimension = c->n, .order = 2, .evaluate = evaluate_field, .user = c, .bounds = bounds_of_field};
 }
 
 /* ---- saving -------------------------------------------------------------------------------------- */

@@ -1,5 +1,5 @@
-/* A solid: a spline, a carrier and a sign, or a form of another part of the kernel. Making, sharing, evaluating; the fit
- * is in solid_fit.c. */
+/* A solid: a spline, a carrier and a sign, or a form of another part of the kernel. Making, sharing, evaluating; the
+ * fit is in solid_fit.c. */
 #include <math.h>
 #include <string.h>
 
@@ -87,8 +87,14 @@ static batten_status evaluate_field(const void *user, batten_context *ctx, size_
   return batten_solid_evaluate(ctx, user, count, points, values, gradients, hessians);
 }
 
+static batten_status bounds_of_field(const void *user, batten_context *ctx, size_t count, const double *boxes,
+                                     double *ranges) {
+  return batten_solid_bounds(ctx, user, count, boxes, ranges);
+}
+
 batten_field batten_solid_field(const batten_solid *s) {
-  return (batten_field){.dimension = s->n, .order = 2, .evaluate = evaluate_field, .user = s};
+  return (batten_field){
+      .dimension = s->n, .order = 2, .evaluate = evaluate_field, .user = s, .bounds = bounds_of_field};
 }
 
 /* ---- making -------------------------------------------------------------------------------------- */

@@ -5,7 +5,21 @@
 #include <batten/spline.h>
 
 #include "basis/polynomial.h"
+#include "spline/clusters.h"
 #include "spline/sum.h"
+
+#include <stdatomic.h>
+
+struct batten_spline {
+  atomic_size_t owners;
+  batten_context *ctx;
+  batten_spline_parts parts; /* pointers into the blocks below */
+  batten_polynomial basis;
+  spline_terms terms;
+  spline_clusters clusters;
+  double *numbers; /* everything of type double */
+  size_t *gradient_at;
+};
 
 /* The caller's unit <-> the unit box. Everybody who changes units uses this one line, so that a centre that is
  * evaluated meets itself at distance exactly 0. */

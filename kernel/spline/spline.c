@@ -8,18 +8,6 @@
 #include "base/checked.h"
 #include "basis/green.h"
 
-#include <stdatomic.h>
-
-struct batten_spline {
-  atomic_size_t owners;
-  batten_context *ctx;
-  batten_spline_parts parts; /* pointers into the blocks below */
-  batten_polynomial basis;
-  spline_terms terms;
-  double *numbers; /* everything of type double */
-  size_t *gradient_at;
-};
-
 /* ---- making ---- */
 
 batten_spline_data batten_spline_data_default(void) {
@@ -130,9 +118,10 @@ batten_status batten_spline_create(batten_context *ctx, const batten_spline_part
   s->parts.gradient_coefficients = to, to = copy(to, gradients * n, parts->gradient_coefficients);
   s->parts.polynomial = to, to = copy(to, k, parts->polynomial);
   make_terms(s, to);
+  st = batten_spline_clusters_new(ctx, &s->terms, &s->clusters);
+  if (st < 0) goto done;
   *out = s;
   s = NULL;
-  st = BATTEN_OK;
 done:
   batten_spline_free(s);
   return st;
@@ -147,6 +136,7 @@ batten_spline *batten_spline_retain(batten_spline *s) {
 
 void batten_spline_free(batten_spline *s) {
   if (!s || atomic_fetch_sub(&s->owners, 1) != 1) return;
+  batten_spline_clusters_free(s->ctx, &s->clusters);
   batten_free(s->ctx, s->gradient_at);
   batten_free(s->ctx, s->numbers);
   batten_free(s->ctx, s);
@@ -247,6 +237,12 @@ static batten_status field_evaluate(const void *user, batten_context *ctx, size_
   return batten_spline_evaluate(ctx, user, count, points, values, gradients, hessians);
 }
 
+static batten_status field_bounds(const void *user, batten_context *ctx, size_t count, const double *boxes,
+                                  double *ranges) {
+  return batten_spline_bounds(ctx, user, count, boxes, ranges);
+}
+
 batten_field batten_spline_field(const batten_spline *s) {
-  return (batten_field){.dimension = s->parts.n, .order = 2, .evaluate = field_evaluate, .user = s};
+  return (batten_field){
+      .dimension = s->parts.n, .order = 2, .evaluate = field_evaluate, .user = s, .bounds = field_bounds};
 }
