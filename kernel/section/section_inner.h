@@ -69,6 +69,7 @@ typedef struct stack {
   stack_path *path; /* NULL when parallel */
   double
       *end_peak[2]; /* rho of the components of the end sections [loops.count], by outer loop; NULL unless ROUNDED */
+  double end_apart[2]; /* half of the smallest distance between those components, INFINITY where there is one */
 } stack;
 
 /* ---- input.c ------------------------------------------------------------------------------------- */
@@ -154,7 +155,17 @@ interval stack_weigh_bounds(const stack_weights *w, double t0, double t1, size_t
 
 /* ---- blend.c, ends.c, parallel.c ------------------------------------------------------------------ */
 
-/* F at places [count][3] = x, y in the section's frame, t in [t_0, t_last]; gradients [count][3] by x, y, t, or NULL.
+/* Where section i lies in the x, y of places: 0 where planes are not parallel and the frame moves with t; in parallel
+ * stacks, whose x and y are measured from the origin of the first section, how far its origin is from there across
+ * the normal. The function of section i is asked at (x, y) - shift; so are links. */
+void stack_shift(const stack *s, size_t i, double shift[2]);
+/* What is blended: w tanh(scale F / w) of F, a value of the section's function; *slope: its derivative by F. */
+double stack_shape(const stack_section *section, double f, double *slope);
+/* Of one section, shaped so, at places [count][2] (x, y of the stack, not of the section); gradients [count][2] or
+ * NULL. At an apex: minus the distance to it. */
+batten_status stack_section_evaluate(const stack *s, batten_context *ctx, size_t i, size_t count,
+                                     const double *places, double *values, double *gradients);
+/* F at places [count][3] = x, y in the stack's frame, t in [t_0, t_last]; gradients [count][3] by x, y, t, or NULL.
  * Links included, ends not. In batches over the sections, so that a section's function is asked once for many places.
  */
 batten_status stack_blend(const stack *s, batten_context *ctx, size_t count, const double *places, double *values,
