@@ -216,7 +216,9 @@ batten_status batten_frep_combine(batten_context *ctx, batten_frep_operation ope
   if (st >= 0) st = check_alpha(ctx, alpha);
   if (st < 0) return st;
   bool distance = alpha == 1 && a->distance && b->distance;
-  return make_pair(ctx, classes[operation], a, b, 1, &alpha, distance, out);
+  st = make_pair(ctx, classes[operation], a, b, 1, &alpha, distance, out);
+  if (st >= 0) (*out)->normal = alpha == 1 && a->normal && b->normal;
+  return st;
 }
 
 /* Neighbours in pairs until one is left: nodes[0] then. nodes are owned; on failure all are let go. */
@@ -507,7 +509,9 @@ batten_status batten_frep_negation(batten_context *ctx, batten_frep *a, batten_f
   if (st >= 0) st = frep_check_node(ctx, "a", a, 0);
   if (st < 0) return st;
   batten_frep_parts parts = {.n = a->n, .child_count = 1, .children = {a}};
-  return frep_make(ctx, &frep_class_negation, &parts, a->distance, NULL, out);
+  st = frep_make(ctx, &frep_class_negation, &parts, a->distance, NULL, out);
+  if (st >= 0) (*out)->normal = a->normal;
+  return st;
 }
 
 static batten_status create_negation(batten_context *ctx, const batten_frep_parts *parts, batten_frep **out) {

@@ -8,6 +8,8 @@
 
 #include "base/checked.h"
 #include "frep/frep_inner.h"
+#include "solid/carrier_inner.h"
+#include "solid/solid_form.h"
 
 /* ---- checks of constructors ----------------------------------------------------------------------- */
 
@@ -71,6 +73,16 @@ static batten_status check_size(batten_context *ctx, const batten_frep_parts *pa
   return BATTEN_OK;
 }
 
+/* Solids that trees make are carriers and leaves again: their depth limits the recursion of these. */
+static unsigned levels_below(const batten_frep_parts *parts) {
+  unsigned below = 0;
+  if (parts->carrier) below = parts->carrier->depth + 1;
+  if (parts->solid) below = batten_solid_depth(parts->solid) + 1;
+  for (size_t i = 0; i < parts->child_count; i++)
+    if (parts->children[i]->below > below) below = parts->children[i]->below;
+  return below;
+}
+
 batten_status frep_make(batten_context *ctx, const frep_class *cls, const batten_frep_parts *parts, bool distance,
                         void *state, batten_frep **out) {
   batten_frep *a = NULL;
@@ -97,7 +109,9 @@ batten_status frep_make(batten_context *ctx, const frep_class *cls, const batten
                      .n = parts->n,
                      .depth = depth,
                      .nodes = nodes,
+                     .below = levels_below(parts),
                      .distance = distance,
+                     .normal = distance,
                      .number_count = parts->number_count,
                      .numbers = numbers,
                      .start_count = parts->start_count,

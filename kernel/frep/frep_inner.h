@@ -2,9 +2,11 @@
  *
  * frep.c         nodes: making, sharing, evaluating in batches, bounds
  * frep_parts.c   the list of all kinds: names, parts, making from parts
- * leaves.c       carriers, solids, ball, cone, polygon, gyroid
+ * leaves.c       ball, cone, gyroid
+ * leaves_given.c carriers, solids, polygon
  * combine.c      R-functions, min and max, blends, negation, morph
- * distance.c     normalize, offset, shell, noise
+ * distance.c     normalize, offset, shell
+ * noise.c        solid noise
  * dimension.c    extrude, revolve, project, section
  * sweep.c        sweeps along paths
  * map.c          affine, twist, bend, taper
@@ -58,7 +60,9 @@ struct batten_frep {
   const frep_class *cls;
   unsigned n, depth;
   size_t nodes;        /* of the tree, shared ones as often as they stand in it */
-  bool distance;       /* batten_frep_is_distance */
+  unsigned below;      /* levels of carriers and solids below: 0 = none */
+  bool distance;       /* batten_frep_is_distance: |f| is at most the distance to f = 0, and |grad f| at most 1 */
+  bool normal;         /* a distance, or one to first order: needs no normalizing. frep_make sets it to distance */
   size_t number_count; /* as in parts */
   double *numbers;
   size_t start_count;

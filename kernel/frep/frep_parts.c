@@ -4,8 +4,11 @@
 
 /* In the order of batten_frep_kind. */
 static const frep_class *const classes[] = {
+    &frep_class_carrier,
+    &frep_class_solid,
     &frep_class_ball,
     &frep_class_cone,
+    &frep_class_polygon,
     &frep_class_gyroid,
     &frep_class_union,
     &frep_class_intersection,
@@ -14,7 +17,11 @@ static const frep_class *const classes[] = {
     &frep_class_blend_union,
     &frep_class_blend_intersection,
     &frep_class_blend_difference,
+    &frep_class_normalize,
+    &frep_class_offset,
+    &frep_class_shell,
     &frep_class_morph,
+    &frep_class_noise,
 };
 
 static const frep_class *find_class(batten_frep_kind kind) {

@@ -73,10 +73,11 @@ BATTEN_API batten_status batten_frep_blend(batten_context *ctx, batten_frep_oper
 
 /* ---- one solid ----------------------------------------------------------------------------------- */
 
-/* f / |grad f|, the distance to the surface to first order near it: what offset and shell put below f unless the node
- * is a distance already (leaves that say so, and what moves, mirrors, unites, intersects (alpha = 1) or negates
- * them). Where the gradient is below 1e-3 of ... it is bounded: see batten_frep_is_distance. The gradient takes two
- * more gradients of f. */
+/* f / sqrt(|grad f|^2 + (f / L)^2), L ten times the size of the solid as its leaves tell it (1e30 where they tell none):
+ * f / |grad f|, the distance to the surface to first order near it, but never beyond L. What offset and shell put below f
+ * unless the node is a distance already (leaves that say so, and what moves, mirrors, offsets, unites, intersects (alpha
+ * = 1) or negates them), or normalized. The gradient takes two more gradients of f. Bounds are narrow only where the
+ * slope of f is bounded too, which it is not for reconstructed solids: there they tell the sign alone. */
 BATTEN_API batten_status batten_frep_normalize(batten_context *ctx, batten_frep *a, batten_frep **out);
 /* Is |f| at most the distance to the surface, and equal to it near the surface? Known by construction. */
 BATTEN_API int batten_frep_is_distance(const batten_frep *a);
@@ -87,8 +88,10 @@ BATTEN_API batten_status batten_frep_shell(batten_context *ctx, batten_frep *a, 
 /* (1 - t) f + t g, t in [0, 1]: metamorphosis; t = 0 and t = 1 give f and g to the bit. */
 BATTEN_API batten_status batten_frep_morph(batten_context *ctx, batten_frep *a, batten_frep *b, double t,
                                            batten_frep **out);
-/* f + amplitude noise(x): solid noise of the paper's section 5.5, in space the product over pairs of axes; |noise| is
- * at most (1 + 1 / 1.17)^n. frequency in radians per unit, amplitude in the unit of f. */
+/* f + amplitude noise(x): solid noise of the paper's section 5.5, the product over the axes in a ring (x y in the plane,
+ * x y z in space) of s(p, q) = sin(w p) + sin(w p / 1.35 + phase sin(w q)) / 1.17; |noise| is at most (1 + 1 / 1.17)^n.
+ * (The paper has the amplitude in s, the second time squared.) w = frequency > 0 in radians per unit, amplitude in the
+ * unit of f. */
 BATTEN_API batten_status batten_frep_noise(batten_context *ctx, batten_frep *a, double amplitude, double frequency,
                                            double phase, batten_frep **out);
 
