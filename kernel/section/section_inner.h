@@ -3,8 +3,11 @@
  * stack.c        batten_stack_build: the order of things; the handle, its parts
  * options.c      defaults and ranges
  * input.c        sections as they come: what makes no sense, frames made orthonormal, loops -> stack
+ * release.c      a stack given back
  * section_fit.c  one section's function: greedy choice of centres; points and carriers as batten_solid_fit does
  * fit_all.c      all sections, on the context's threads
+ * section.c      batten_section_fit: the function of one section alone
+ * places.c       places along the loops and beside them, for the fit and for the proof
  * certify.c      does a section's function have the sign of its polygons, and how far does it miss them
  * components.c   outer loops with their holes, which overlap from section to section, pieces, notes
  * links.c        components without a partner joined in sheared frames
@@ -87,7 +90,7 @@ batten_status stack_check_options(batten_context *ctx, size_t count, const batte
  * points [starts..] are for the fit to read from the caller's sections. */
 batten_status stack_take_sections(batten_context *ctx, size_t count, const batten_section *sections,
                                   const batten_stack_options *opt, stack *out, stack_notes *notes);
-void stack_release(stack *s); /* all that hangs on it, not s itself */
+void stack_release(stack *s); /* all that hangs on it, not s itself (release.c) */
 
 /* ---- section_fit.c, fit_all.c, certify.c ---------------------------------------------------------- */
 
@@ -130,9 +133,11 @@ batten_status stack_link_evaluate(const stack *s, batten_context *ctx, size_t at
  */
 batten_status stack_link_bounds(const stack *s, batten_context *ctx, size_t at, size_t count, const double *boxes,
                                 double *upper);
-/* Pairs of sections whose planes cross in a line that meets the areas (convex hulls) of both. */
+/* Pairs of sections whose planes cross in a line of which a part lies in the convex hulls of both: notes CROSSING, section
+ * before other, contour SIZE_MAX. */
 batten_status stack_find_crossings(batten_context *ctx, const stack *s, stack_notes *notes, size_t *crossings);
-/* One solid in space from the loops of all sections; figures of the fit go to *status. */
+/* One solid in space through the centres of all sections' functions, which must be there; pair_distance is for sections of
+ * points in no order. Returns BATTEN_W_ACCURACY as batten_spline_fit. */
 batten_status stack_fit_space(batten_context *ctx, const stack *s, double pair_distance, batten_solid **out,
                               size_t *centers);
 
