@@ -498,11 +498,20 @@ batten_status batten_trace_outline(batten_context *ctx, const batten_field *fiel
   if (!ctx) return BATTEN_E_INVALID;
   batten_polygonize_options o = opt ? *opt : batten_polygonize_options_default();
   batten_frame frame;
-  batten_status st = batten_polygonize_frame(ctx, 2, field, seed_count, seeds, &o, out, &frame);
-  if (st < 0) return st;
+  double *searched = NULL;
+  size_t evaluations = 0;
+  batten_status st = batten_polygonize_seeds(ctx, 2, field, out, &o, &seed_count, &seeds, &searched, &evaluations);
+  if (st >= 0) st = batten_polygonize_frame(ctx, 2, field, seed_count, seeds, &o, out, &frame);
+  if (st < 0) {
+    batten_free(ctx, searched);
+    return st;
+  }
   batten_polygonize_info found = {.cell = frame.cell};
-  batten_sampler sampler = {
-      .ctx = ctx, .field = field, .evaluations_max = o.evaluations_max, .difference = BATTEN_DIFFERENCE * frame.cell};
+  batten_sampler sampler = {.ctx = ctx,
+                            .field = field,
+                            .evaluations = evaluations,
+                            .evaluations_max = o.evaluations_max,
+                            .difference = BATTEN_DIFFERENCE * frame.cell};
   walker w = {.sampler = &sampler, .ctx = ctx};
   chain_list chains = {.loops = 0};
   batten_outline *outline = NULL;
@@ -535,6 +544,7 @@ batten_status batten_trace_outline(batten_context *ctx, const batten_field *fiel
   if (info) *info = found;
   st = batten_polygonize_warn(ctx, &found, tolerance);
 done:
+  batten_free(ctx, searched);
   batten_free(ctx, chains.first);
   batten_free(ctx, chains.closed);
   batten_free(ctx, chains.points);

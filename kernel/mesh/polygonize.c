@@ -4,6 +4,7 @@
 #include "basis/neighbours.h"
 #include "improve.h"
 #include "mesh_inner.h"
+#include "seeds.h"
 #include "track.h"
 
 #include "base/checked.h"
@@ -51,7 +52,9 @@ static batten_status check_arguments(batten_context *ctx, unsigned n, const batt
                        field->dimension, n == 3 ? "batten_polygonize" : "batten_trace_outline", n);
   if (!out) return batten_fail(ctx, BATTEN_E_INVALID, "out: NULL; give the address of the result");
   if (seed_count == 0 || !seeds)
-    return batten_fail(ctx, BATTEN_E_INVALID, "seeds: none; give points on or near the surface");
+    return batten_fail(ctx, BATTEN_E_INVALID,
+                       "seeds: none; give points on or near the surface, or none, opt.lower and opt.upper, and a "
+                       "field with bounds");
   size_t values;
   if (!batten_mul(seed_count, n, &values) || values > SIZE_MAX / sizeof *seeds)
     return batten_fail(ctx, BATTEN_E_TOO_LARGE, "seed_count: %zu", seed_count);
@@ -153,6 +156,24 @@ batten_status batten_polygonize_frame(batten_context *ctx, unsigned n, const bat
   return BATTEN_OK;
 }
 
+batten_status batten_polygonize_seeds(batten_context *ctx, unsigned n, const batten_field *field, const void *out,
+                                      batten_polygonize_options *opt, size_t *seed_count, const double **seeds,
+                                      double **found, size_t *evaluations) {
+  bool given = false;
+  for (unsigned k = 0; k < n; k++) given = given || opt->lower[k] != 0 || opt->upper[k] != 0;
+  if (*seed_count || *seeds || !out || !given) return BATTEN_OK;
+  if (!field || !field->evaluate || !field->bounds || field->dimension != n) return BATTEN_OK;
+  batten_status st = check_options(ctx, n, opt);
+  if (st < 0) return st;
+  if (opt->cell == 0) opt->cell = CELL_LARGEST * diagonal(n, opt->lower, opt->upper);
+  batten_sampler sampler = {.ctx = ctx, .field = field, .evaluations_max = opt->evaluations_max};
+  st = batten_search_seeds(&sampler, opt->lower, opt->upper, opt->cell, seed_count, found);
+  if (st < 0) return st;
+  *seeds = *found;
+  *evaluations = sampler.evaluations;
+  return BATTEN_OK;
+}
+
 /* ---- the phases --------------------------------------------------------------------------------- */
 
 batten_status batten_polygonize_warn(batten_context *ctx, const batten_polygonize_info *info, double tolerance) {
@@ -218,13 +239,23 @@ batten_status batten_polygonize(batten_context *ctx, const batten_field *field, 
   if (!ctx) return BATTEN_E_INVALID;
   batten_polygonize_options o = opt ? *opt : batten_polygonize_options_default();
   batten_frame frame;
-  batten_status st = batten_polygonize_frame(ctx, 3, field, seed_count, seeds, &o, out, &frame);
-  if (st < 0) return st;
+  double *searched = NULL;
+  size_t evaluations = 0;
+  batten_status st = batten_polygonize_seeds(ctx, 3, field, out, &o, &seed_count, &seeds, &searched, &evaluations);
+  if (st >= 0) st = batten_polygonize_frame(ctx, 3, field, seed_count, seeds, &o, out, &frame);
+  if (st < 0) {
+    batten_free(ctx, searched);
+    return st;
+  }
   batten_polygonize_info found = {.cell = frame.cell};
   mesh_surface surface = {.ctx = ctx};
-  batten_sampler sampler = {
-      .ctx = ctx, .field = field, .evaluations_max = o.evaluations_max, .difference = BATTEN_DIFFERENCE * frame.cell};
+  batten_sampler sampler = {.ctx = ctx,
+                            .field = field,
+                            .evaluations = evaluations,
+                            .evaluations_max = o.evaluations_max,
+                            .difference = BATTEN_DIFFERENCE * frame.cell};
   st = make_surface(&sampler, &frame, seed_count, seeds, &o, &surface, &found);
+  batten_free(ctx, searched);
   found.evaluations = sampler.evaluations;
   if (st >= 0)
     st = batten_mesh_create(ctx, surface.vertex_count, surface.points, surface.triangle_count, surface.origin, out);

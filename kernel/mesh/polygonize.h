@@ -15,6 +15,13 @@ batten_status batten_polygonize_frame(batten_context *ctx, unsigned n, const bat
                                       const double *seeds, const batten_polygonize_options *opt, const void *out,
                                       batten_frame *frame);
 
+/* Where no seeds are given but a box and a field with bounds: opt->cell is set, and *seeds (freed by batten_free
+ * through *found), *seed_count and *evaluations are those of a search; else nothing happens. What is wrong otherwise
+ * is left to batten_polygonize_frame. */
+batten_status batten_polygonize_seeds(batten_context *ctx, unsigned n, const batten_field *field, const void *out,
+                                      batten_polygonize_options *opt, size_t *seed_count, const double **seeds,
+                                      double **found, size_t *evaluations);
+
 /* BATTEN_W_ACCURACY, BATTEN_W_CLIPPED or BATTEN_OK, as info says. */
 batten_status batten_polygonize_warn(batten_context *ctx, const batten_polygonize_info *info, double tolerance);
 

@@ -172,9 +172,9 @@ typedef struct batten_polygonize_info {
  * without a seed are not found, by design. A mesh that crosses itself is made again on a lattice of half, then a
  * quarter of the cell (and then half the edges). Same bits for any order of the seeds and any number of threads.
  *   field   three-dimensional; order 0 costs six evaluations for a gradient
- *   seeds   NULL with seed_count 0, opt.lower and opt.upper given, and a field with bounds: the whole surface in the box
- *           is found (batten_find_seeds with the cell)
- *   Progress phases: "surface", "improve", "settle".
+ *   seeds   NULL with seed_count 0, opt.lower and opt.upper given, and a field with bounds: the whole surface in the
+ *           box is found (batten_find_seeds with the cell; 0 = 1/60 of the box's diagonal)
+ *   Progress phases: "search" (without seeds), "surface", "improve", "settle".
  * Positive status: BATTEN_W_ACCURACY (accuracy is missed, or the mesh crosses itself), BATTEN_W_CLIPPED.
  * Fails: INVALID (also: the field is not finite somewhere, the text names the point), NOMEM, TOO_LARGE (cells,
  * indices, evaluations_max), NOT_FOUND (f changes its sign near no seed), CANCELLED, and as the field fails. info may
@@ -183,12 +183,13 @@ BATTEN_API batten_status batten_polygonize(batten_context *ctx, const batten_fie
                                            const double *seeds, const batten_polygonize_options *opt,
                                            batten_mesh **out, batten_polygonize_info *info);
 
-/* Points beside the surface f = 0 in a box, from the field's bounds alone: boxes whose bounds have one sign are left out,
- * the others halved until they are no larger than `cell`, and where neighbouring corners of these differ in sign there is a
- * seed. So no part of the surface is missed that the corners of cells of that size show. *seeds [*count][n] is freed by
- * batten_free(ctx, *seeds). n = 2 or 3. Cost: the cells near the surface. Progress phase "search". Fails: INVALID (the
- * field has no bounds, box, cell), NOT_FOUND (no sign changes: all inside, or all outside), TOO_LARGE, NOMEM, CANCELLED,
- * as the field fails. */
+/* Points beside the surface f = 0 in a box, by the field's bounds: boxes whose bounds have one sign are left out, the
+ * others halved until they are no larger than `cell`, and where neighbouring corners of these differ in sign there is
+ * a seed between them. So no part of the surface is missed that the corners of cells of that size show. *seeds
+ * [*count][n] is freed by batten_free(ctx, *seeds). n = 2 or 3. Cost: the cells near the surface. Progress phase
+ * "search". Fails: INVALID (the field has no bounds, is not finite at a corner, box, cell), NOT_FOUND (no sign
+ * changes: all inside, or all outside), TOO_LARGE (cell under a millionth of the box, too many boxes), NOMEM,
+ * CANCELLED, as the field fails. */
 BATTEN_API batten_status batten_find_seeds(batten_context *ctx, const batten_field *field, const double *lower,
                                            const double *upper, double cell, size_t *count, double **seeds);
 
@@ -196,7 +197,8 @@ BATTEN_API batten_status batten_find_seeds(batten_context *ctx, const batten_fie
 
 typedef struct batten_outline batten_outline;
 /* As batten_polygonize in 2-D: evenly spaced polylines with the solid on their left, open ones (from box to box)
- * first. cell, lower, upper, accuracy, evaluations_max of opt count. Progress phases: "outline", "settle". */
+ * first. Without seeds as there. cell, lower, upper, accuracy, evaluations_max of opt count. Progress phases: "search"
+ * (without seeds), "outline", "settle". */
 BATTEN_API batten_status batten_trace_outline(batten_context *ctx, const batten_field *field, size_t seed_count,
                                               const double *seeds, const batten_polygonize_options *opt,
                                               batten_outline **out, batten_polygonize_info *info);
