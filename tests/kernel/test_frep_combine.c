@@ -56,14 +56,14 @@ static void test_operations(batten_context *ctx) {
       batten_frep *a = NULL;
       snprintf(what, sizeof what, "%s, alpha %g", names[operation], alphas[i]);
       T_OK(batten_frep_combine(ctx, (batten_frep_operation)operation, p.ball, p.cone, alphas[i], &a), ctx);
-      frep_check(ctx, what, a, 2, 0.01, 1e-7, 20000);
+      frep_check(ctx, what, a, 2, 0.01, 1e-7, 25600);
       T_CHECK(batten_frep_is_distance(a) == (alphas[i] == 1), "%s is a distance where it is max or min", what);
       batten_frep_free(a);
       snprintf(what, sizeof what, "%s, blend %d", names[operation], i);
       T_OK(batten_frep_blend(ctx, (batten_frep_operation)operation, p.ball, p.cone, i % 2 ? -0.2 : 0.3, 0.2 + i,
                              0.3 + 2 * i, &a),
            ctx);
-      frep_check(ctx, what, a, 2, 0.01, 1e-7, 20000);
+      frep_check(ctx, what, a, 2, 0.01, 1e-7, 25600);
       batten_frep_free(a);
     }
   free_parts(p);
