@@ -7,9 +7,15 @@
  * combine.c      R-functions, min and max, blends, negation, morph
  * distance.c     normalize, offset, shell
  * noise.c        solid noise
- * dimension.c    extrude, revolve, project, section
+ * gather.c       nodes whose value is that of a child elsewhere: maps, extrusions, sweeps of profiles
+ * highest.c      the largest value of a child along a track of places: shadows, sweeps
+ * dimension.c    extrude, revolve, section
+ * project.c      project
  * sweep.c        sweeps along paths
- * map.c          affine, twist, bend, taper
+ * map.c          affine
+ * axis_frame.c   frames about an axis, for the maps that follow
+ * axis_maps.c    twist, taper
+ * bend.c         bend
  * deform.c       displaced points
  * frep_box.c     the box of a tree
  * frep_solid.c   a tree as a solid

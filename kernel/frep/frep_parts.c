@@ -22,6 +22,14 @@ static const frep_class *const classes[] = {
     &frep_class_shell,
     &frep_class_morph,
     &frep_class_noise,
+    &frep_class_extrude,
+    &frep_class_revolve,
+    &frep_class_project,
+    &frep_class_section,
+    &frep_class_affine,
+    &frep_class_twist,
+    &frep_class_bend,
+    &frep_class_taper,
 };
 
 static const frep_class *find_class(batten_frep_kind kind) {

@@ -102,9 +102,10 @@ BATTEN_API batten_status batten_frep_extrude(batten_context *ctx, batten_frep *a
                                              batten_frep **out);
 /* n = 2 to 3: turned about z; the plane's x is the distance from the axis, its y becomes z. */
 BATTEN_API batten_status batten_frep_revolve(batten_context *ctx, batten_frep *a, batten_frep **out);
-/* n = 3 to 2: the shadow along an axis (0, 1, 2): the union over its interval, max f, found to 1e-9 of the interval
- * from at least `samples` places and by the node's bounds. The plane has the two other coordinates in the order x y
- * z. */
+/* n = 3 to 2: the shadow along an axis (0, 1, 2): the union over its interval, max f, closed in to 1e-9 of a step
+ * between `samples` (2 .. 10^6) even places, of which the node's bounds tell what may be left out. Where f has more
+ * than one peak in half a step, all but one of them may be missed. The plane has the two other coordinates in the
+ * order x y z. */
 BATTEN_API batten_status batten_frep_project(batten_context *ctx, batten_frep *a, unsigned axis, double lower,
                                              double upper, size_t samples, batten_frep **out);
 /* Cut of a solid by the plane through origin with the orthonormal axes: n = 3 to 2. */
@@ -128,8 +129,9 @@ BATTEN_API batten_status batten_frep_affine(batten_context *ctx, batten_frep *a,
 BATTEN_API batten_status batten_frep_twist(batten_context *ctx, batten_frep *a, const double origin[3],
                                            const double axis[3], double rate, batten_frep **out);
 /* The height h along axis above origin becomes an arc of curvature `curvature` > 0 towards `direction` (across axis),
- * between heights lower and upper; beyond them straight on. The solid must stay within 1 / curvature of the axis on
- * the inside: beyond that the map folds, and f is taken at the fold. n = 3. */
+ * between heights lower and upper, at most one turn; beyond them straight on. Where arc and straight parts come to lie
+ * in one another (from half a turn on) the solid is their union. It must stay within 1 / curvature of the axis on the
+ * inside: beyond that the map folds, and f is taken at the fold. n = 3. */
 BATTEN_API batten_status batten_frep_bend(batten_context *ctx, batten_frep *a, const double origin[3],
                                           const double axis[3], const double direction[3], double curvature,
                                           double lower, double upper, batten_frep **out);
