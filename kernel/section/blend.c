@@ -79,6 +79,41 @@ batten_status stack_section_evaluate(const stack *s, batten_context *ctx, size_t
   return st;
 }
 
+static interval shape_bounds(const stack_section *section, interval f) {
+  f = interval_scale(f, section->scale);
+  double w = section->saturation;
+  return w < INFINITY ? interval_scale(interval_tanh(interval_div(f, interval_of(w))), w) : f;
+}
+
+/* Distances change by no more than their place moves: from the middle of the box to its corners. */
+static interval apex_bounds(const stack_section *at, const double *box) {
+  double middle[2] = {0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3])};
+  double reach = hypot(0.5 * (box[2] - box[0]), 0.5 * (box[3] - box[1])), d = apex_value(at, middle, NULL);
+  double size = fabs(box[0]) + fabs(box[1]) + fabs(box[2]) + fabs(box[3]);
+  for (unsigned k = 0; k < at->apex_count; k++) size += fabs(at->apex[k][0]) + fabs(at->apex[k][1]);
+  double slack = 16 * 0x1p-52 * size;
+  return (interval){d - reach - slack, fmin(0, d + reach + slack)};
+}
+
+batten_status stack_section_bounds(const stack *s, batten_context *ctx, size_t i, size_t count, const double *boxes,
+                                   double *ranges) {
+  const stack_section *at = &s->sections[i];
+  double shift[2], *own = batten_alloc_array(ctx, count, 4 * sizeof *own);
+  if (!own) return BATTEN_E_NOMEM;
+  stack_shift(s, i, shift); /* differences of doubles grow with them, rounded: corners are to be shifted as places */
+  for (size_t b = 0; b < 2 * count; b++)
+    for (unsigned k = 0; k < 2; k++) own[2 * b + k] = boxes[2 * b + k] - shift[k];
+  batten_status st = at->function ? batten_solid_bounds(ctx, at->function, count, own, ranges) : BATTEN_OK;
+  for (size_t b = 0; b < count && st >= 0; b++) {
+    interval f = at->function ? (interval){ranges[2 * b], ranges[2 * b + 1]} : apex_bounds(at, own + 4 * b);
+    f = shape_bounds(at, f);
+    ranges[2 * b] = f.lo;
+    ranges[2 * b + 1] = f.hi;
+  }
+  batten_free(ctx, own);
+  return st;
+}
+
 /* ---- batches of columns --------------------------------------------------------------------------- */
 
 /* Places of one (x, y) whose windows of sections join. */
@@ -109,6 +144,7 @@ static void batch_free(batten_context *ctx, blend_batch *b) {
   batten_free(ctx, b->answer_slopes);
 }
 
+/* To be freed whatever comes of it. */
 static batten_status batch_make(batten_context *ctx, const stack *s, size_t count, bool gradients, blend_batch *b) {
   size_t n = count < BATCH ? count : BATCH, width = s->count < STACK_WINDOW ? s->count : STACK_WINDOW;
   *b = (blend_batch){.s = s, .capacity = n};
@@ -121,7 +157,6 @@ static batten_status batch_make(batten_context *ctx, const stack *s, size_t coun
     b->answer_slopes = batten_alloc_array(ctx, n, 2 * sizeof *b->answer_slopes);
   }
   bool made = b->column && b->table && b->asked && b->answer && (!gradients || (b->slopes && b->answer_slopes));
-  if (!made) batch_free(ctx, b);
   return made ? BATTEN_OK : BATTEN_E_NOMEM;
 }
 
@@ -226,9 +261,8 @@ batten_status stack_blend(const stack *s, batten_context *ctx, size_t count, con
   if (count == 0) return BATTEN_OK;
   blend_batch batch;
   batten_status st = batch_make(ctx, s, count, gradients != NULL, &batch);
-  if (st < 0) return st;
-  uint32_t *order = batten_alloc_array(ctx, count < BLOCK ? count : BLOCK, sizeof *order);
-  st = order ? BATTEN_OK : BATTEN_E_NOMEM;
+  uint32_t *order = st < 0 ? NULL : batten_alloc_array(ctx, count < BLOCK ? count : BLOCK, sizeof *order);
+  if (!order) st = BATTEN_E_NOMEM;
   for (size_t from = 0; from < count && st >= 0; from += BLOCK) {
     size_t some = count - from < BLOCK ? count - from : BLOCK;
     batch.places = places + 3 * from;

@@ -15,7 +15,8 @@
  * space.c        one volume spline through the centres of all sections
  *
  * weights.c      one-dimensional blends between sections
- * blend.c        F(x, y, t): section functions scaled, saturated and blended, in batches; bounds
+ * blend.c        F(x, y, t): section functions scaled, saturated and blended, in batches
+ * blend_bounds.c bounds of it over boxes
  * ends.c         what closes the solid at its first and last section
  * parallel.c     f in space where planes are parallel
  * rotations.c    exponentials, logarithms, splines of rotations; integration of angular velocity
@@ -170,11 +171,15 @@ double stack_shape(const stack_section *section, double f, double *slope);
  * NULL. At an apex: minus the distance to it. */
 batten_status stack_section_evaluate(const stack *s, batten_context *ctx, size_t i, size_t count,
                                      const double *places, double *values, double *gradients);
+/* Bounds of it over boxes [count][2][2], ranges [count][2]. */
+batten_status stack_section_bounds(const stack *s, batten_context *ctx, size_t i, size_t count, const double *boxes,
+                                   double *ranges);
 /* F at places [count][3] = x, y in the stack's frame, t in [t_0, t_last]; gradients [count][3] by x, y, t, or NULL.
  * Links included, ends not. In batches over the sections, so that a section's function is asked once for many places.
  */
 batten_status stack_blend(const stack *s, batten_context *ctx, size_t count, const double *places, double *values,
                           double *gradients);
+/* boxes [count][2][3], lower and upper (x, y, t), t in [t_0, t_last]. */
 batten_status stack_blend_bounds(const stack *s, batten_context *ctx, size_t count, const double *boxes,
                                  double *ranges);
 /* The rule of an end (0 first, 1 last), at (x, y) of its section and `beyond` its plane (negative: inside of it,
