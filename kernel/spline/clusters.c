@@ -12,51 +12,72 @@ static size_t node_count(size_t terms) {
   return nodes;
 }
 
-static void fill_leaf(const spline_terms *t, const size_t *order, spline_cluster *c) {
+static void find_box(const spline_terms *t, const size_t *order, spline_cluster *c) {
   for (unsigned a = 0; a < 3; a++) {
     c->lower[a] = a < t->n ? INFINITY : 0;
     c->upper[a] = a < t->n ? -INFINITY : 0;
   }
+  for (size_t i = c->low; i < c->high; i++)
+    for (unsigned a = 0; a < t->n; a++) {
+      c->lower[a] = fmin(c->lower[a], t->x[a][order[i]]);
+      c->upper[a] = fmax(c->upper[a], t->x[a][order[i]]);
+    }
+}
+
+static void find_contents(const spline_terms *t, const size_t *order, spline_cluster *c) {
+  const unsigned n = t->n;
+  double m0 = 0, m1[3] = {0, 0, 0}, m2[9] = {0}, size1 = 0, size2 = 0, rest = 0, middle[3];
   c->w = c->g = 0;
+  for (unsigned a = 0; a < 3; a++) middle[a] = (c->lower[a] + c->upper[a]) / 2;
   for (size_t i = c->low; i < c->high; i++) {
     size_t j = order[i];
-    double square = 0;
-    for (unsigned a = 0; a < t->n; a++) {
-      c->lower[a] = fmin(c->lower[a], t->x[a][j]);
-      c->upper[a] = fmax(c->upper[a], t->x[a][j]);
-      if (j >= t->plain) square += t->g[a][j - t->plain] * t->g[a][j - t->plain];
+    double w = t->w[j], g[3] = {0, 0, 0}, d[3] = {0, 0, 0}, length = 0, distance = 0;
+    for (unsigned a = 0; a < n; a++) {
+      d[a] = t->x[a][j] - middle[a];
+      if (j >= t->plain) g[a] = t->g[a][j - t->plain];
+      length += g[a] * g[a];
+      distance += d[a] * d[a];
     }
-    c->w += fabs(t->w[j]);
-    c->g += sqrt(square);
+    length = sqrt(length);
+    distance = sqrt(distance);
+    m0 += w;
+    for (unsigned a = 0; a < n; a++) {
+      m1[a] += w * d[a] + g[a];
+      for (unsigned b = 0; b < n; b++) m2[3 * a + b] += w * d[a] * d[b] / 2 + (g[a] * d[b] + g[b] * d[a]) / 2;
+    }
+    c->w += fabs(w);
+    c->g += length;
+    size1 += fabs(w) * distance + length;
+    size2 += (fabs(w) * distance / 2 + length) * distance;
+    rest += (fabs(w) * distance / 6 + length / 2) * distance * distance;
   }
+  /* Rounding of sums that cancel; 3: components, and the root of their number. */
+  double rounding = 3 * ((double)(c->high - c->low) + 16) * 0x1p-52, square1 = 0, square2 = 0;
+  for (unsigned a = 0; a < 3; a++) square1 += m1[a] * m1[a];
+  for (unsigned a = 0; a < 9; a++) square2 += m2[a] * m2[a];
+  c->moments[0] = fabs(m0) + rounding * c->w;
+  c->moments[1] = sqrt(square1) + rounding * size1;
+  c->moments[2] = sqrt(n * square2) + rounding * size2;
+  c->moments[3] = rest * (1 + rounding);
 }
 
-static void join(const spline_cluster *a, const spline_cluster *b, spline_cluster *c) {
-  for (unsigned k = 0; k < 3; k++) {
-    c->lower[k] = fmin(a->lower[k], b->lower[k]);
-    c->upper[k] = fmax(a->upper[k], b->upper[k]);
-  }
-  c->w = a->w + b->w;
-  c->g = a->g + b->g;
-}
-
-/* nodes [count] from the terms in their order: ranges downwards, contents upwards. */
+/* nodes [count] from the terms in their order. */
 static void fill(const spline_terms *t, const size_t *order, size_t count, spline_cluster *nodes) {
   nodes[0].low = 0;
   nodes[0].high = t->plain + t->hermite;
-  for (size_t i = 0; 2 * i + 2 < count; i++) {
-    /* Where a leaf's place has children, these hold nothing and nobody goes there. */
+  for (size_t i = 0; i < count; i++) {
     size_t low = nodes[i].low, high = nodes[i].high, middle = low + (high - low) / 2;
+    /* Where a leaf's place has children, these hold nothing and nobody goes there. */
     if (spline_cluster_is_leaf(nodes + i)) middle = low = high;
-    nodes[2 * i + 1].low = low;
-    nodes[2 * i + 1].high = nodes[2 * i + 2].low = middle;
-    nodes[2 * i + 2].high = high;
+    if (2 * i + 2 < count) {
+      nodes[2 * i + 1].low = low;
+      nodes[2 * i + 1].high = nodes[2 * i + 2].low = middle;
+      nodes[2 * i + 2].high = high;
+    }
+    if (nodes[i].low == nodes[i].high) continue;
+    find_box(t, order, nodes + i);
+    find_contents(t, order, nodes + i);
   }
-  for (size_t i = count; i-- > 0;)
-    if (spline_cluster_is_leaf(nodes + i))
-      fill_leaf(t, order, nodes + i);
-    else
-      join(nodes + 2 * i + 1, nodes + 2 * i + 2, nodes + i);
 }
 
 batten_status batten_spline_clusters_new(batten_context *ctx, const spline_terms *terms, spline_clusters *out) {

@@ -11,7 +11,12 @@ enum { CLUSTER_LEAF = 8 };
 typedef struct spline_cluster {
   double lower[3], upper[3]; /* unit box */
   double w, g;               /* sums of |w| and of the lengths of the gradient coefficients */
-  size_t low, high;          /* its terms, as places in order[] */
+  /* Seen from afar, with t = centre - middle of the box, the sum of w phi(x - t) - g . grad phi(x - t) is
+   * M0 phi - M1 . grad phi + M2 : D2 phi, M0 = sum w, M1 = sum (w t + g), M2 = sum (w t t' / 2 + g t'), in which the
+   * coefficients cancel, up to A |D3 phi|, A = sum (|w| |t|^3 / 6 + |g| |t|^2 / 2): sizes of M0, M1, M2 (the sum of
+   * its |eigenvalues| is no larger) and A. */
+  double moments[4];
+  size_t low, high; /* its terms, as places in order[] */
 } spline_cluster;
 
 /* Node i has the children 2 i + 1 and 2 i + 2, each with half of its terms; up to CLUSTER_LEAF terms are a leaf. */
