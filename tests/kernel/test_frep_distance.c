@@ -241,8 +241,8 @@ static void test_bad(batten_context *ctx) {
   double f, g[3], range[2];
   T_OK(batten_frep_evaluate(ctx, b, 1, o, &f, g), ctx);
   T_OK(batten_frep_bounds(ctx, b, 1, (double[6]){0}, range), ctx);
-  T_CHECK(fabs(f - 1e30) < 1e18 && g[0] == 0 && range[0] <= f && range[1] >= f, "a field without slope: %g in [%g, %g]", f,
-          range[0], range[1]);
+  T_CHECK(fabs(f - 1e30) < 1e18 && g[0] == 0 && range[0] <= f && range[1] >= f,
+          "a field without slope: %g in [%g, %g]", f, range[0], range[1]);
   batten_frep_free(a);
   batten_frep_free(b);
   batten_carrier_free(line);

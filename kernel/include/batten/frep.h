@@ -45,9 +45,9 @@ BATTEN_API batten_status batten_frep_cone(batten_context *ctx, const double a[3]
 /* Signed distance of closed polygons in the plane, parted by even-odd; starts [count + 1], points [..][2]. n = 2. */
 BATTEN_API batten_status batten_frep_polygon(batten_context *ctx, size_t count, const size_t *starts,
                                              const double *points, batten_frep **out);
-/* Lattice of one sheet: the gyroid G = sin X cos Y + sin Y cos Z + sin Z cos X = 0, X = 2 pi x / period, as a slab of
- * about the thickness: f = thickness / 2 - |G| period / (2 pi 1.531). 1.531 is the mean slope of G on G = 0, where it is
- * from 1.414 to 1.732: the slab is from 8 % thicker to 12 % thinner. n = 3. */
+/* Lattice of one sheet: the gyroid G = sin X cos Y + sin Y cos Z + sin Z cos X = 0, X = 2 pi x / period, as a slab
+ * of about the thickness: f = thickness / 2 - |G| period / (2 pi 1.531). 1.531 is the mean slope of G on G = 0,
+ * where it is from 1.414 to 1.732: the slab is from 8 % thicker to 12 % thinner. n = 3. */
 BATTEN_API batten_status batten_frep_gyroid(batten_context *ctx, double period, double thickness, batten_frep **out);
 
 /* ---- set operations and blends ------------------------------------------------------------------- */
@@ -65,19 +65,20 @@ BATTEN_API batten_status batten_frep_combine_all(batten_context *ctx, batten_fre
 /* -f: the complement. */
 BATTEN_API batten_status batten_frep_negation(batten_context *ctx, batten_frep *a, batten_frep **out);
 /* Operation + a0 / (1 + (f / a1)^2 + (g / a2)^2), a of the R-function 0: a0 > 0 adds material, a0 < 0 takes some
- * away; a1, a2 > 0 say how far from either surface. Where |g| = d the function changes by at most e = |a0| / (1 + (d /
- * a2)^2), and the surface f = 0 of a distance moves there by at most 1.71 e where that is under d (by about e where it
- * is far under); likewise with f and a1. */
+ * away; a1, a2 > 0 say how far from either surface. Where |g| = d the function changes by at most e = |a0| / (1 + (d
+ * / a2)^2), and the surface f = 0 of a distance moves there by at most 1.71 e where that is under d (by about e
+ * where it is far under); likewise with f and a1. */
 BATTEN_API batten_status batten_frep_blend(batten_context *ctx, batten_frep_operation operation, batten_frep *a,
                                            batten_frep *b, double a0, double a1, double a2, batten_frep **out);
 
 /* ---- one solid ----------------------------------------------------------------------------------- */
 
-/* f / sqrt(|grad f|^2 + (f / L)^2), L ten times the size of the solid as its leaves tell it (1e30 where they tell none):
- * f / |grad f|, the distance to the surface to first order near it, but never beyond L. What offset and shell put below f
- * unless the node is a distance already (leaves that say so, and what moves, mirrors, offsets, unites, intersects (alpha
- * = 1) or negates them), or normalized. The gradient takes two more gradients of f. Bounds are narrow only where the
- * slope of f is bounded too, which it is not for reconstructed solids: there they tell the sign alone. */
+/* f / sqrt(|grad f|^2 + (f / L)^2), L ten times the size of the solid as its leaves tell it (1e30 where they tell
+ * none): f / |grad f|, the distance to the surface to first order near it, but never beyond L. What offset and shell
+ * put below f unless the node is a distance already (leaves that say so, and what moves, mirrors, offsets, unites,
+ * intersects (alpha = 1) or negates them), or normalized. The gradient takes two more gradients of f. Bounds are
+ * narrow only where the slope of f is bounded too, which it is not for reconstructed solids: there they tell the
+ * sign alone. */
 BATTEN_API batten_status batten_frep_normalize(batten_context *ctx, batten_frep *a, batten_frep **out);
 /* Is |f| at most the distance to the surface, and equal to it near the surface? Known by construction. */
 BATTEN_API int batten_frep_is_distance(const batten_frep *a);
@@ -88,10 +89,10 @@ BATTEN_API batten_status batten_frep_shell(batten_context *ctx, batten_frep *a, 
 /* (1 - t) f + t g, t in [0, 1]: metamorphosis; t = 0 and t = 1 give f and g to the bit. */
 BATTEN_API batten_status batten_frep_morph(batten_context *ctx, batten_frep *a, batten_frep *b, double t,
                                            batten_frep **out);
-/* f + amplitude noise(x): solid noise of the paper's section 5.5, the product over the axes in a ring (x y in the plane,
- * x y z in space) of s(p, q) = sin(w p) + sin(w p / 1.35 + phase sin(w q)) / 1.17; |noise| is at most (1 + 1 / 1.17)^n.
- * (The paper has the amplitude in s, the second time squared.) w = frequency > 0 in radians per unit, amplitude in the
- * unit of f. */
+/* f + amplitude noise(x): solid noise of the paper's section 5.5, the product over the axes in a ring (x y in the
+ * plane, x y z in space) of s(p, q) = sin(w p) + sin(w p / 1.35 + phase sin(w q)) / 1.17; |noise| is at most (1 + 1
+ * / 1.17)^n. (The paper has the amplitude in s, the second time squared.) w = frequency > 0 in radians per unit,
+ * amplitude in the unit of f. */
 BATTEN_API batten_status batten_frep_noise(batten_context *ctx, batten_frep *a, double amplitude, double frequency,
                                            double phase, batten_frep **out);
 
@@ -128,10 +129,10 @@ BATTEN_API batten_status batten_frep_affine(batten_context *ctx, batten_frep *a,
 /* About the line through origin along axis (n = 3): turned by rate times the height along it. */
 BATTEN_API batten_status batten_frep_twist(batten_context *ctx, batten_frep *a, const double origin[3],
                                            const double axis[3], double rate, batten_frep **out);
-/* The height h along axis above origin becomes an arc of curvature `curvature` > 0 towards `direction` (across axis),
- * between heights lower and upper, at most one turn; beyond them straight on. Where arc and straight parts come to lie
- * in one another (from half a turn on) the solid is their union. It must stay within 1 / curvature of the axis on the
- * inside: beyond that the map folds, and f is taken at the fold. n = 3. */
+/* The height h along axis above origin becomes an arc of curvature `curvature` > 0 towards `direction` (across
+ * axis), between heights lower and upper, at most one turn; beyond them straight on. Where arc and straight parts
+ * come to lie in one another (from half a turn on) the solid is their union. It must stay within 1 / curvature of
+ * the axis on the inside: beyond that the map folds, and f is taken at the fold. n = 3. */
 BATTEN_API batten_status batten_frep_bend(batten_context *ctx, batten_frep *a, const double origin[3],
                                           const double axis[3], const double direction[3], double curvature,
                                           double lower, double upper, batten_frep **out);
@@ -157,10 +158,11 @@ BATTEN_API batten_status batten_frep_evaluate(batten_context *ctx, const batten_
 BATTEN_API batten_status batten_frep_bounds(batten_context *ctx, const batten_frep *a, size_t count,
                                             const double *boxes, double *ranges);
 BATTEN_API batten_field batten_frep_field(const batten_frep *a); /* order 1, with bounds; valid as long as the node */
-/* A finite box [n] each that holds the solid f >= 0, wider than it by 0.4 to about 1 % of its largest extent on each side
- * (more where bounds are wide), found by bounds within what the structure tells: for reconstructed solids the box of the
- * data and half its diagonal, for offsets and shells of what is no distance 4 times as much as for a distance. Progress
- * phase "box". NOT_FOUND: no end was found (a half-space, a negation), or the solid is empty: the text says which. */
+/* A finite box [n] each that holds the solid f >= 0, wider than it by 0.4 to about 1 % of its largest extent on each
+ * side (more where bounds are wide), found by bounds within what the structure tells: for reconstructed solids the
+ * box of the data and half its diagonal, for offsets and shells of what is no distance 4 times as much as for a
+ * distance. Progress phase "box". NOT_FOUND: no end was found (a half-space, a negation), or the solid is empty: the
+ * text says which. */
 BATTEN_API batten_status batten_frep_box(batten_context *ctx, const batten_frep *a, double *lower, double *upper);
 /* The tree as a solid: mesh, save, carrier of others. lower, upper [n]: the box in which its surface is looked for;
  * both NULL = batten_frep_box. cell: how fine, for the points on its surface; 0 = 1/60 of the diagonal. NOT_FOUND: no
