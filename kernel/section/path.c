@@ -29,6 +29,7 @@ struct stack_path {
   batten_context *ctx;
   size_t count; /* pieces */
   double drift;
+  stack_plane *planes; /* [count / STACK_PATH_PIECES + 1], behind the pieces */
   stack_piece pieces[];
 };
 
@@ -280,11 +281,27 @@ static void path_origins(const stack *s, const double *t, double *scratch, stack
   }
 }
 
+static void fill_planes(stack_path *p, size_t count, const double *t) {
+  for (size_t i = 0; i < count; i++)
+    for (int side = 0; side < 2; side++) { /* the last piece before the section, the first one after it */
+      stack_plane *plane = p->planes + i;
+      size_t k = STACK_PATH_PIECES * i;
+      if (k > 0 && (side == 0 || k == p->count)) k--;
+      stack_frame f;
+      stack_piece_frame(p->pieces + k, t[i], &f);
+      plane->t = t[i];
+      memcpy(plane->origin, f.origin, sizeof f.origin);
+      memcpy(plane->rotation, f.rotation, sizeof f.rotation);
+      memcpy(plane->slope[side], f.d_rotation[2], sizeof plane->slope[side]);
+      plane->advance[side] = vec_dot(f.rotation[2], f.d_origin);
+    }
+}
+
 batten_status stack_path_make(batten_context *ctx, const stack *s, stack_path **out) {
   assert(s->count >= 2);
   size_t count = s->count, bytes;
   batten_status st = BATTEN_E_NOMEM;
-  if (!batten_mul3(count, STACK_PATH_PIECES, sizeof(stack_piece), &bytes) ||
+  if (!batten_mul(count, STACK_PATH_PIECES * sizeof(stack_piece) + sizeof(stack_plane), &bytes) ||
       !batten_add(bytes, sizeof(stack_path), &bytes))
     return batten_fail(ctx, BATTEN_E_TOO_LARGE, "count: %zu sections", count);
   stack_path *p = batten_alloc(ctx, bytes);
@@ -293,6 +310,7 @@ batten_status stack_path_make(batten_context *ctx, const stack *s, stack_path **
   if (!p || !scratch) goto done;
   double *t = scratch + 10 * count;
   *p = (stack_path){.ctx = ctx, .count = STACK_PATH_PIECES * (count - 1)};
+  p->planes = (stack_plane *)(p->pieces + p->count);
   for (size_t i = 0; i < count; i++) t[i] = s->sections[i].t;
   for (size_t k = 0; k < p->count; k++) {
     size_t i = k / STACK_PATH_PIECES, j = k % STACK_PATH_PIECES;
@@ -311,6 +329,7 @@ batten_status stack_path_make(batten_context *ctx, const stack *s, stack_path **
   }
   path_origins(s, t, scratch, p->pieces);
   for (size_t k = 0; k < p->count; k++) piece_bounds(p->pieces + k);
+  fill_planes(p, count, t);
   *out = p;
   p = NULL;
   st = BATTEN_OK;
@@ -346,4 +365,14 @@ double stack_path_drift(const stack_path *p) { return p->drift; }
 size_t stack_path_pieces(const stack_path *p, const stack_piece **pieces) {
   *pieces = p->pieces;
   return p->count;
+}
+
+size_t stack_path_planes(const stack_path *p, const stack_plane **planes) {
+  *planes = p->planes;
+  return p->count / STACK_PATH_PIECES + 1;
+}
+
+double stack_path_speed(const stack_path *p, unsigned end) {
+  const stack_plane *a = end ? p->planes + p->count / STACK_PATH_PIECES - 1 : p->planes;
+  return vec_distance(a[0].origin, a[1].origin) / (a[1].t - a[0].t);
 }

@@ -15,8 +15,18 @@ typedef struct stack_piece {
   double middle[3], reach; /* the origin stays in this ball */
 } stack_piece;
 
+/* The plane of a section: g(p) = normal . (p - origin) is a point's height over it. As the plane moves on, g has the
+ * derivative slope . (p - origin) - advance; [0] before the section, [1] after it. */
+typedef struct stack_plane {
+  double t, origin[3], rotation[3][3]; /* normal: rotation[2] */
+  double slope[2][3], advance[2];
+} stack_plane;
+
 /* Piece STACK_PATH_PIECES i + j is the j-th between the sections i and i + 1. */
 size_t stack_path_pieces(const stack_path *p, const stack_piece **pieces);
+size_t stack_path_planes(const stack_path *p, const stack_plane **planes);
+/* Length for a unit of t beside the first (end 0) or last section. */
+double stack_path_speed(const stack_path *p, unsigned end);
 /* The frame at t, held to the piece's ends. */
 void stack_piece_frame(const stack_piece *piece, double t, stack_frame *out);
 

@@ -20,8 +20,10 @@
  * ends.c         what closes the solid at its first and last section
  * parallel.c     f in space where planes are parallel
  * rotations.c    exponentials, logarithms, splines of rotations; integration of angular velocity
- * path.c         the moving frame M(t), o(t) and its derivatives
+ * path.c         the moving frame M(t), o(t), its derivatives, and bounds of its motion (path.h)
  * swept.c        f in space where planes are not parallel: the t of a point
+ * swept_bounds.c bounds of it over boxes
+ * frames.c       batten_stack_frames
  *
  * All in the caller's unit. */
 #ifndef BATTEN_SECTION_INNER_H

@@ -62,10 +62,12 @@ typedef enum batten_stack_end {
 /* How M(t) runs through the rotations of the sections. */
 typedef enum batten_stack_rotation {
   BATTEN_ROTATION_SPHERICAL = 0, /* C1 spherical spline */
-  BATTEN_ROTATION_GEODESIC,      /* M_i exp(t ln(M_i' M_(i+1))) */
+  BATTEN_ROTATION_GEODESIC,      /* M_i exp(t ln(M_i' M_(i+1))); as SPHERICAL it fails where a section is half a turn
+                                    from the one before */
   BATTEN_ROTATION_LOGARITHM,     /* the paper's exp((1 - t) ln M_i + t ln M_(i+1)): not the same in a turned frame of
-                                    reference; fails near rotations by pi */
-  BATTEN_ROTATION_VELOCITY       /* integrated from the angular velocity, from rotation of the first section on */
+                                    reference; fails where a section is half a turn from the axes of that frame */
+  BATTEN_ROTATION_VELOCITY       /* integrated from the angular velocity, from rotation of the first section on:
+                                    sections stand in these frames, their own rotations only serve checks */
 } batten_stack_rotation;
 
 typedef enum batten_stack_path {
@@ -74,7 +76,9 @@ typedef enum batten_stack_path {
 } batten_stack_path;
 
 typedef enum batten_stack_parameter {
-  BATTEN_PARAMETER_ROOT = 0, /* the moving plane goes through the point: n(t) . (p - o(t)) = 0 */
+  BATTEN_PARAMETER_ROOT = 0, /* the moving plane goes through the point: n(t) . (p - o(t)) = 0; the largest value of
+                                all such t, so that the solid is the union of what the plane sweeps. f jumps at the
+                                envelope of the planes, about which the path bends: it belongs outside of sections */
   BATTEN_PARAMETER_RATIO     /* the paper's d_1 / (d_1 + d_2), distances to the planes of two neighbouring sections */
 } batten_stack_parameter;
 
@@ -111,7 +115,8 @@ typedef struct batten_stack_options {
   const double *parameters;       /* [count] increasing: t of the sections; NULL = chord lengths of the origins,
                                      in parallel planes heights */
   const double *angular_velocity; /* [count][3] omega at t of the sections, in the section's own frame, radians per
-                                     unit of t; for BATTEN_ROTATION_VELOCITY. NULL. */
+                                     unit of t (of the chords' length where parameters are not given); for
+                                     BATTEN_ROTATION_VELOCITY. NULL. */
   /* all */
   batten_stack_route route;
   int link; /* non-zero: components without a partner in the next section are joined to the nearest by blending in a
@@ -181,7 +186,7 @@ typedef struct batten_stack_parts {
   const double *scales;           /* [count] */
   const double *saturations;      /* [count] w_i, INFINITY = none */
   const double *angular_velocity; /* [count][3] or NULL */
-  batten_section_method method;    /* POINTS, CARRIER: a section's one contour is its points, in no order */
+  batten_section_method method;   /* POINTS, CARRIER: a section's one contour is its points, in no order */
   batten_stack_between between;
   double shape;
   batten_stack_end ends[2];
@@ -207,16 +212,24 @@ BATTEN_API batten_status batten_section_fit(batten_context *ctx, const batten_se
                                             const batten_stack_options *opt, batten_solid **out,
                                             batten_stack_info *info);
 
-/* Frames and origins of a stack at any t, for pictures and checks: rotations [count][3][3], origins [count][3]. */
+/* Frames and origins of a stack at t [count], held beyond its ends, for pictures and checks: rotations [count][3][3],
+ * origins [count][3]. Where planes are parallel the first section's frame goes up along its normal. Fails: INVALID
+ * (not a solid of batten_stack_build by its sections), outputs untouched then. */
 BATTEN_API batten_status batten_stack_frames(batten_context *ctx, const batten_solid *solid, size_t count,
                                              const double *t, double *rotations, double *origins);
 
-/* M(t) from its angular velocity: gamma' + omega x gamma = 0 for each of the three columns of direction cosines,
- * omega in the moving frame [Savchenko et al. 1995, section 4]; rows of M are the axes, as in batten_section. omega
- * [count][3] at increasing times [count], interpolated by a C2 spline; first [3][3] at times[0]; rotations
- * [at_count][3][3] at times at [at_count] within. *drift (may be NULL): largest | |gamma|^2 - 1 | on the way. MAGNUS
- * exponentials of order 4: keeps the first integral to rounding RUNGE_KUTTA  order 4, columns renormalised after each
- * step, steps of a quarter of a sample: drift is before that */
+/* M(t) from its angular velocity: gamma' + omega x gamma = 0 for each of the three columns of direction cosines
+ * [Savchenko et al. 1995, section 4]; rows of M are the axes, as in batten_section.
+ *   count      samples of omega, at least 2
+ *   times      [count] finite, increasing
+ *   omega      [count][3] in the moving frame, radians per unit of time; a C2 spline (not-a-knot) runs through them
+ *   first      [3][3] M at times[0], a rotation to 1e-6
+ *   at         [at_count] in any order, within times[0] .. times[count - 1]
+ *   rotations  [at_count][3][3] M there, rotations to rounding
+ *   drift      largest | |gamma|^2 - 1 | on the way; may be NULL
+ * MAGNUS: exponentials of order 4, which keep the first integral |gamma| = 1 to rounding. RUNGE_KUTTA: order 4,
+ * columns made unit after each step; drift is what they were before. Both step by a quarter of the samples' distance.
+ * Time: O(count + at_count log count). Fails: INVALID, NOMEM, TOO_LARGE; outputs untouched then. */
 typedef enum batten_kinematics { BATTEN_KINEMATICS_MAGNUS = 0, BATTEN_KINEMATICS_RUNGE_KUTTA } batten_kinematics;
 BATTEN_API batten_status batten_rotations_integrate(batten_context *ctx, batten_kinematics method, size_t count,
                                                     const double *times, const double *omega, const double *first,
