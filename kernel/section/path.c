@@ -165,6 +165,9 @@ static void piece_bounds(stack_piece *p) {
   p->reach = 0;
   for (int m = 0; m < 4; m++) p->reach = fmax(p->reach, vec_distance(p->origin[m], p->middle));
   p->reach *= 1 + 1e-14;
+  interval across = interval_hypot(interval_abs(p->rate[0]), interval_abs(p->rate[1]));
+  p->turn_most = across.hi;
+  p->advance_most = interval_abs(p->velocity[2]).hi;
 }
 
 /* ---- the ways from section to section ----------------------------------------------------------------------------

@@ -12,7 +12,8 @@ typedef struct stack_piece {
   double origin[4][3];           /* Bezier points */
   interval rate[3];              /* of the angular velocity and of M o', both in the moving frame, over the piece */
   interval velocity[3];
-  double middle[3], reach; /* the origin stays in this ball */
+  double middle[3], reach;        /* the origin stays in this ball */
+  double turn_most, advance_most; /* of the rate across the normal, and of the velocity along it */
 } stack_piece;
 
 /* The plane of a section: g(p) = normal . (p - origin) is a point's height over it. As the plane moves on, g has the
