@@ -20,22 +20,24 @@
 
 enum {
   START_STRIDE = 12, /* places, about four edges */
-  START_LEAST = 8,   /* centres of a loop, if it has as many places */
+  START_LEAST = 8,   /* centres of a loop, if it has as many places ... */
+  START_MOST = 64,   /* ... and no more, however dense its points are */
   ROUND_MOST = 40,   /* new places of a round, or a quarter of those there are */
-  ROUNDS = 64,
+  ROUNDS = 40,       /* 3 to 7 are usual */
   SIGN_ROUNDS = 8,
-  HALVINGS = 3,
   FAR = 16,
   SIGN_CELLS = 48
 };
 static const double PART = 0.9;       /* of the tolerance is aimed at, since other places than ours are judged */
 static const double STEP = 0.35;      /* of places, in edges ... */
 static const double STEP_MAX = 3.5;   /* ... and in tolerances */
-static const double APART = 1.25;     /* new places of a round, in edges */
+static const double APART = 1.25;     /* new places of a round, in edges ... */
+static const double APART_MAX = 40;   /* ... and in tolerances, for edges that are long beside it */
 static const double MEET = 0.05;      /* of its pair distance: a centre nearer than this to another is left out */
 static const double SLOPE_MIN = 0.3;  /* where F is flatter than this the miss counts as if it were not */
 static const double FAR_RADIUS = 2;   /* half diagonals of the box */
 static const double SIGN_SHIFT = 0.5; /* of the grid, in cells */
+static const double SIGN_NEAR = 1.25; /* of the places nearest to the loops, in tolerances */
 
 typedef struct section_fit {
   batten_context *ctx;
@@ -51,6 +53,7 @@ typedef struct section_fit {
   double *points, *values;      /* [capacity][2], [capacity] of F */
   batten_spline *spline;        /* of -F: a solid is minus its spline */
   batten_status status;         /* of the last fit */
+  unsigned rounds;              /* of all so far */
 } section_fit;
 
 /* ---- centres ------------------------------------------------------------------------------------- */
@@ -83,11 +86,12 @@ static void add(section_fit *s, const double *x, double value) {
   s->values[s->count++] = value;
 }
 
-/* The centre beside place i, out of the area (side = 1) or in it (-1): as far off as the loop's edges and halvings
- * let it lie on its side, no nearer to another part of the loops than half its offset. */
+/* The centre beside place i, out of the area (side = 1) or in it (-1): as far off as the loop's edges let it lie on
+ * its side, no nearer to another part of the loops than half its offset, or half as far, and so on; none in parts as
+ * thin as the tolerance. */
 static void add_beside(section_fit *s, size_t i, int side) {
   double offset = s->pair_distance * s->places.edge[s->loop[i]];
-  for (int halving = 0; halving <= HALVINGS; halving++, offset /= 2) {
+  for (; offset >= 0.5 * s->tolerance; offset /= 2) {
     double x[2];
     for (unsigned k = 0; k < 2; k++) x[k] = s->places.x[2 * i + k] + side * offset * s->places.outward[2 * i + k];
     double distance = polygon_distance(s->loops, x, NULL, NULL);
@@ -102,7 +106,7 @@ static batten_status add_place(section_fit *s, size_t i) {
   s->used[i] = 1;
   batten_status st = reserve(s, 3);
   /* Loops may touch, and an edge may come back along another; a centre each would be nearly the same. */
-  if (st < 0 || meets_another(s, x, 0.1 * MEET * s->places.edge[s->loop[i]])) return st;
+  if (st < 0 || meets_another(s, x, fmin(0.1 * MEET * s->places.edge[s->loop[i]], 0.1 * s->tolerance))) return st;
   add(s, x, 0);
   add_beside(s, i, 1);
   add_beside(s, i, -1);
@@ -127,6 +131,7 @@ static batten_status add_first(section_fit *s) {
   for (size_t loop = 0; st >= 0 && loop < s->loops->count; loop++) {
     size_t first = s->places.starts[loop], count = s->places.starts[loop + 1] - first;
     size_t wanted = count / START_STRIDE > START_LEAST ? count / START_STRIDE : START_LEAST;
+    if (wanted > START_MOST) wanted = START_MOST;
     if (wanted > count) wanted = count;
     for (size_t j = 0; st >= 0 && j < wanted; j++)
       st = add_place(s, first + j * (count / wanted) + j * (count % wanted) / wanted);
@@ -193,7 +198,7 @@ static batten_status add_worst(section_fit *s, size_t *added) {
   qsort(s->candidates, count, sizeof *s->candidates, compare_candidates);
   for (size_t c = 0; c < count && *added < most; c++) {
     const size_t i = s->candidates[c].at;
-    const double apart = APART * s->places.edge[s->loop[i]];
+    const double apart = fmin(APART * s->places.edge[s->loop[i]], APART_MAX * s->tolerance);
     bool free = true;
     for (size_t j = 0; j < *added && free; j++) {
       const size_t other = s->candidates[j].at;
@@ -209,7 +214,7 @@ static batten_status add_worst(section_fit *s, size_t *added) {
 
 static batten_status follow_loops(section_fit *s) {
   size_t added = 1;
-  for (int round = 0; round < ROUNDS; round++) {
+  for (; s->rounds < ROUNDS; s->rounds++) {
     batten_status st = fit_centers(s);
     if (st >= 0) st = measure_misses(s);
     if (st >= 0) st = add_worst(s, &added);
@@ -250,8 +255,8 @@ done:
 static batten_status follow_signs(section_fit *s) {
   double *x = NULL;
   size_t count, added;
-  batten_status st =
-      loop_places_beside(s->ctx, s->loops, &s->places, 1, s->tolerance, SIGN_CELLS, SIGN_SHIFT, &x, &count);
+  batten_status st = loop_places_beside(s->ctx, s->loops, &s->places, 1, SIGN_NEAR * s->tolerance, SIGN_CELLS,
+                                        SIGN_SHIFT, &x, &count);
   for (int round = 0; st >= 0 && round < SIGN_ROUNDS; round++) {
     st = add_wrong_signs(s, count, x, &added);
     if (st < 0 || added == 0) break;

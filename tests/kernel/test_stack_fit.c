@@ -139,6 +139,35 @@ static void test_shapes(batten_context *ctx) {
   }
 }
 
+/* What is awkward: parts thinner than the tolerance, corners with long edges, spikes, places where loops touch,
+ * points that nearly coincide. */
+static void test_awkward(batten_context *ctx) {
+  static const char *const names[] = {"sliver", "spikes", "touching", "thin ring", "dense"};
+  for (int shape = 0; shape < 5; shape++) {
+    stack_scene scene = {0};
+    stack_scene_slice(&scene, 0);
+    if (shape == 0) stack_scene_loop(&scene, 4, (double[]){0, 0, 3, 0, 3, 0.01, 0, 0.01});
+    double spikes[80];
+    for (int i = 0; i < 40; i++) {
+      double r = i % 2 ? 1 : 5, a = 2 * SCENE_PI * i / 40;
+      spikes[2 * i] = r * cos(a);
+      spikes[2 * i + 1] = r * sin(a);
+    }
+    if (shape == 1) stack_scene_loop(&scene, 40, spikes);
+    if (shape == 2) stack_scene_loop(&scene, 4, (double[]){0, 0, 1, -1, 2, 0, 1, 1});
+    if (shape == 2) stack_scene_loop(&scene, 4, (double[]){2, 0, 3, -1, 4, 0, 3, 1});
+    if (shape == 3) stack_scene_disc(&scene, 0, 0, 10, 60), stack_scene_disc(&scene, 0, 0, 9.99, 60);
+    if (shape == 4) stack_scene_disc(&scene, 0, 0, 10, 1500);
+    fitted f = fit_first(ctx, &scene, shape == 0 ? 0.5 : 0.1);
+    T_OK(section_certify(ctx, &f.s.sections[0].loops, f.s.sections[0].function, f.tolerance, &f.figures), ctx);
+    T_CHECK(f.figures.certified, "%s: certified, wrong sign %.3g of %.3g (%zu centres)", names[shape],
+            f.figures.wrong_sign_max, f.tolerance, f.figures.centers);
+    if (shape == 4) T_CHECK(f.figures.centers < 500, "dense points do not cost a centre each");
+    free_stack(&f.s);
+    stack_scene_free(&scene);
+  }
+}
+
 static void test_random(batten_context *ctx) {
   stack_scene scene = {0};
   stack_scene_random(&scene, 8, 40, 60);
@@ -250,6 +279,14 @@ static batten_status fit_scene(batten_context *ctx, stack_scene *scene, stack *s
   return stack_fit_all(ctx, s, stack_scene_sections(scene), &options, 0.05, figures);
 }
 
+static bool same_figures(size_t count, const section_figures *a, const section_figures *b) {
+  size_t same = 0;
+  for (size_t i = 0; i < count; i++)
+    same += a[i].centers == b[i].centers && a[i].residual_max == b[i].residual_max && a[i].status == b[i].status &&
+            a[i].wrong_sign_max == b[i].wrong_sign_max && a[i].certified == b[i].certified;
+  return same == count;
+}
+
 static size_t count_differing(const stack *a, const stack *b) {
   size_t differing = 0;
   for (size_t i = 0; i < a->count; i++) {
@@ -284,7 +321,7 @@ static void test_threads(void) {
     if (k == 4) o.memory_limit = 3000000; /* too little for an arena */
     batten_context_new(&o, &ctx[k]);
     T_OK(fit_scene(ctx[k], &scene, &s[k], figures[k]), ctx[k]);
-    same += count_differing(&s[0], &s[k]) == 0 && !memcmp(figures[0], figures[k], sizeof figures[0]);
+    same += count_differing(&s[0], &s[k]) == 0 && same_figures(COUNT, figures[0], figures[k]);
   }
   T_CHECK(same == RUNS, "same bits with 1, 2, 3 threads, a host's loop, and without room for arenas");
   for (size_t i = 0; i < COUNT; i++) {
@@ -301,6 +338,49 @@ static void test_threads(void) {
     T_CHECK(batten_bytes_in_use(ctx[k]) == 0, "nothing held");
     batten_context_free(ctx[k]);
   }
+  stack_scene_free(&scene);
+}
+
+/* A heart of 33 drawn slices, where the data are at hand; test_random is its twin. */
+static void test_heart(batten_context *ctx) {
+  const char *shared = getenv("BATTEN_SHARED");
+  char path[1024];
+  snprintf(path, sizeof path, "%s/data/contours/rt_Heart.txt", shared ? shared : "");
+  FILE *file = shared ? fopen(path, "r") : NULL;
+  if (!file) {
+    t_skip("heart", "no shared data");
+    return;
+  }
+  stack_scene scene = {0};
+  for (size_t count; fscanf(file, " contour %zu", &count) == 1;) {
+    double *p = malloc(2 * count * sizeof *p), z = 0;
+    for (size_t i = 0; i < count; i++)
+      if (fscanf(file, "%lf %lf %lf", p + 2 * i, p + 2 * i + 1, &z) != 3) T_CHECK(false, "heart: point %zu", i);
+    stack_scene_slice(&scene, z);
+    stack_scene_loop(&scene, count, p);
+    free(p);
+  }
+  fclose(file);
+  stack s = make_stack(ctx, &scene);
+  batten_stack_options options = {.struct_size = sizeof options, .pair_distance = 0.75};
+  section_figures *figures = malloc(s.count * sizeof *figures);
+  const double tolerance = 0.2, start = batten_now();
+  T_OK(stack_fit_all(ctx, &s, stack_scene_sections(&scene), &options, tolerance, figures), ctx);
+  const double seconds = batten_now() - start;
+  size_t certified = 0, centers = 0;
+  double depth = 0, miss = 0;
+  for (size_t i = 0; i < s.count; i++) {
+    certified += figures[i].certified;
+    centers += figures[i].centers;
+    depth = fmax(depth, figures[i].wrong_sign_max);
+    miss = fmax(miss, figures[i].residual_max);
+  }
+  T_CHECK(s.count == 33 && certified == 33, "heart: %zu of %zu slices certified in %.2f s, wrong sign %.3g at most",
+          certified, s.count, seconds, depth);
+  T_RATIO(miss, 1.05 * tolerance, "heart: miss");
+  T_RATIO((double)centers, 1.6 * (double)scene.points, "heart: %zu centres for %zu points", centers, scene.points);
+  free(figures);
+  free_stack(&s);
   stack_scene_free(&scene);
 }
 
@@ -326,10 +406,12 @@ int main(void) {
   batten_context *ctx = t_context(NULL, NULL, 1);
   test_disc(ctx);
   test_shapes(ctx);
+  test_awkward(ctx);
   test_random(ctx);
   test_invariance(ctx);
   test_proof(ctx);
   test_points(ctx);
+  test_heart(ctx);
   T_CHECK(batten_bytes_in_use(ctx) == 0, "nothing held");
   batten_context_free(ctx);
   test_threads();
