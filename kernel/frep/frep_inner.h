@@ -11,7 +11,8 @@
  * highest.c      the largest value of a child along a track of places: shadows, sweeps
  * dimension.c    extrude, revolve, section
  * project.c      project
- * sweep.c        sweeps along paths
+ * sweep.c        sweeps along paths: of solids
+ * sweep_profile.c  of profiles; sweep_path.c, sweep_roots.c: paths, and their planes through a point
  * map.c          affine
  * axis_frame.c   frames about an axis, for the maps that follow
  * axis_maps.c    twist, taper

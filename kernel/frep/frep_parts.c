@@ -26,10 +26,12 @@ static const frep_class *const classes[] = {
     &frep_class_revolve,
     &frep_class_project,
     &frep_class_section,
+    &frep_class_sweep,
     &frep_class_affine,
     &frep_class_twist,
     &frep_class_bend,
     &frep_class_taper,
+    &frep_class_deform,
 };
 
 static const frep_class *find_class(batten_frep_kind kind) {

@@ -57,4 +57,7 @@ void frep_intervals_box(unsigned n, const interval *x, double *box);
 /* sum_j matrix[j] x[j], and the range of what rounding makes of it. */
 interval frep_linear_range(unsigned n, const double *row, const interval *x);
 
+/* Inverse of a matrix [n][n], n = 2 or 3; false where it has none (map.c). */
+bool frep_invert(unsigned n, const double *matrix, double *inverse);
+
 #endif

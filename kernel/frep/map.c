@@ -86,7 +86,7 @@ static bool affine_box(const batten_frep *a, double *lower, double *upper) {
 
 /* Inverse by cofactors of the matrix brought to about 1 by a power of two; false where it has none: det below the
  * rounding of its terms. */
-static bool invert(unsigned n, const double *matrix, double *inverse) {
+bool frep_invert(unsigned n, const double *matrix, double *inverse) {
   double m[9], largest = 0, row[3] = {0}, det, product = 1;
   for (unsigned i = 0; i < n * n; i++) largest = fmax(largest, fabs(matrix[i]));
   if (!(largest > 0)) return false;
@@ -140,7 +140,7 @@ batten_status batten_frep_affine(batten_context *ctx, batten_frep *a, const doub
   if (st >= 0) st = frep_check_numbers(ctx, "shift", n, shift);
   if (st < 0) return st;
   affine_state s = {.scale = 1};
-  if (!invert(n, matrix, s.inverse))
+  if (!frep_invert(n, matrix, s.inverse))
     return batten_fail(ctx, BATTEN_E_INVALID,
                        "matrix: has no inverse; give one whose rows do not depend on each "
                        "other");

@@ -114,9 +114,12 @@ BATTEN_API batten_status batten_frep_section(batten_context *ctx, batten_frep *a
                                              const double axes[2][3], batten_frep **out);
 /* Sweep along a path of points [count][3]: the union of all places of a. n = 3: moved by path(t) - path(0) without
  * turning; n = 2: the profile in the plane across the path, in rotation-minimising frames (up [3]: the profile's y
- * axis at the start, as far as it is across the path; NULL = any). smooth: C2 spline through the points over chord
- * lengths, else a polyline (of n = 2: every piece on its own, joined by union). closed: the last point is followed by
- * the first. */
+ * axis at the start, as far as it is across the path; NULL or no length = any). smooth: C2 spline through the points
+ * over chord lengths, else a polyline (of n = 2: every piece on its own, joined by union). closed: the last point is
+ * followed by the first; frames of smooth closed paths are turned back evenly by what they miss. Of n = 2, f is the
+ * largest of the profile's in all planes across the path through x: the exact union also where planes cross within;
+ * where places of a tight bend end, f may jump. Of n = 3 the path is gone through in 32 pieces or more, as by
+ * batten_frep_project: thin parts far apart may be missed where bounds do not tell. */
 BATTEN_API batten_status batten_frep_sweep(batten_context *ctx, batten_frep *a, size_t count, const double *path,
                                            int smooth, int closed, const double *up, batten_frep **out);
 
