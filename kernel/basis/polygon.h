@@ -66,6 +66,8 @@ void polygon_set_free(polygon_set *p); /* takes a zeroed struct too */
 double polygon_distance(const polygon_set *p, const double x[2], double *nearest, size_t *edge);
 /* Distance to some loops only, unsigned: those with chosen[loop] != 0. INFINITY where none is chosen. */
 double polygon_distance_to(const polygon_set *p, const unsigned char *chosen, const double x[2]);
+/* The same with the nearest place [2], untouched where none is chosen. */
+double polygon_nearest_to(const polygon_set *p, const unsigned char *chosen, const double x[2], double *nearest);
 bool polygon_inside(const polygon_set *p, const double x[2]);
 /* Signed distance takes no value outside of [range[0], range[1]] in the box (rounding included). */
 void polygon_distance_bounds(const polygon_set *p, const double lower[2], const double upper[2], double range[2]);

@@ -114,10 +114,14 @@ double polygon_distance(const polygon_set *p, const double x[2], double *nearest
   return polygon_inside(p, x) ? d : -d;
 }
 
-double polygon_distance_to(const polygon_set *p, const unsigned char *chosen, const double x[2]) {
-  double place[2];
+double polygon_nearest_to(const polygon_set *p, const unsigned char *chosen, const double x[2], double *nearest) {
   size_t edge;
-  return sqrt(nearest_edge(p, chosen, x, place, &edge));
+  return sqrt(nearest_edge(p, chosen, x, nearest, &edge));
+}
+
+double polygon_distance_to(const polygon_set *p, const unsigned char *chosen, const double x[2]) {
+  double nearest[2];
+  return polygon_nearest_to(p, chosen, x, nearest);
 }
 
 /* ---- bounds -------------------------------------------------------------------------------------- */

@@ -121,15 +121,17 @@ batten_status stack_fit_all(batten_context *ctx, stack *s, const batten_section 
 
 /* ---- components.c, links.c, crossings.c, space.c -------------------------------------------------- */
 
-/* Overlaps of components of neighbouring sections, in the frame of the lower one's plane carried along (parallel:
- * shifted by the origins): notes NO_OVERLAP, THIN; pieces of the graph. Where link: s->links is filled and notes say
- * LINKED. */
+/* Overlaps of components of neighbouring sections, in the places that both have in common (stack_shift): notes
+ * NO_OVERLAP, THIN; pieces of the graph, 0 where no section has loops. Sections without loops (apexes, points in no
+ * order) count for nothing. Where link: a component without a partner is joined to the nearest of the other section
+ * if that belongs to another piece (else it is the end of a lobe): s->links is filled, sorted by section, and notes
+ * say LINKED; non_overlaps counts these sides too. */
 batten_status stack_find_components(batten_context *ctx, stack *s, bool link, stack_notes *notes, size_t *pieces,
                                     size_t *non_overlaps);
-/* What the links of section `at` (between it and the next) add at places [count][2] with u = (t - t_at) / (t_next -
- * t_at) in [0, 1]: values becomes max(values, links), gradients [count][3] (d/dx, d/dy, d/du) likewise; may be NULL.
- * The links' functions are 0 exactly where F_at is at u = 0 within their component, and never above the scaled,
- * saturated F_at (u = 0), F_next (u = 1). */
+/* What the links of section `at` (between it and the next) add at places [count][2] of the stack with u = (t - t_at) /
+ * (t_next - t_at) in [0, 1]: values becomes max(values, links), gradients [count][3] (d/dx, d/dy, d/du) likewise; may
+ * be NULL. On the planes themselves, u = 0 and u = 1, nothing is changed: links are never above the scaled, saturated
+ * F_at and F_next there. */
 batten_status stack_link_evaluate(const stack *s, batten_context *ctx, size_t at, size_t count, const double *places,
                                   const double *u, double *values, double *gradients);
 /* upper [count]: bounds of the links' values from above over boxes [count][2][3] (x, y, u); -INFINITY without links.

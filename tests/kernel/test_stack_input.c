@@ -41,9 +41,7 @@ static void reset(scene *s) {
 static batten_context *ctx;
 
 static void release(stack *s, stack_notes *notes) {
-  for (size_t i = 0; i < s->count; i++) polygon_set_free(&s->sections[i].loops);
-  batten_free(notes->ctx, s->sections);
-  batten_free(notes->ctx, s->angular_velocity);
+  stack_release(s);
   batten_free(notes->ctx, notes->items);
 }
 
