@@ -198,12 +198,30 @@ static int sign_at(const sweep_path *path, size_t node, const interval *x) {
   return h.lo > 0 ? 1 : h.hi < 0 ? -1 : 0;
 }
 
+/* What most pieces are: all coefficients of h at the middle of the box are farther from 0, on one side, than they
+ * change in it, as no plane's normal is longer than the fastest slope. */
+static bool is_far(const sweep_piece *p, const interval *x, double slack) {
+  double q[3], half[3], least = INFINITY, most = -INFINITY;
+  for (int k = 0; k < 3; k++) {
+    half[k] = x[k].hi / 2 - x[k].lo / 2;
+    q[k] = x[k].lo / 2 + x[k].hi / 2 - p->b[0][k];
+  }
+  for (int i = 0; i < 6; i++) {
+    double h = dot(p->plane[i], q) - p->offset[i];
+    least = fmin(least, h);
+    most = fmax(most, h);
+  }
+  double change = p->fast * sqrt(dot(half, half)) * (1 + 1e-12) + slack;
+  return least > change || most < -change;
+}
+
 /* May the piece have a root for some x of the box; if so, where. */
 static bool root_range(const sweep_path *path, size_t piece, const interval *x, interval *u) {
   const sweep_piece *p = path->piece + piece;
   interval q[3], hull = {INFINITY, -INFINITY}, h[6];
-  offset_from(x, p->b[0], q);
   double slack = rounding(path, x) * p->fast;
+  if (is_far(p, x, slack)) return false;
+  offset_from(x, p->b[0], q);
   for (int i = 0; i < 6; i++) {
     h[i] = wider(interval_sub(frep_linear_range(3, p->plane[i], q), interval_of(p->offset[i])), slack);
     hull = interval_hull(hull, h[i]);
