@@ -256,6 +256,69 @@ static batten_status blend_block(blend_batch *b, batten_context *ctx, size_t cou
   return BATTEN_OK;
 }
 
+/* ---- links ---------------------------------------------------------------------------------------- */
+
+/* Places between section `at` and the next one, asked of its links at once. */
+typedef struct link_batch {
+  uint32_t *index;                    /* [BATCH] of the places */
+  double *x, *u, *values, *gradients; /* gradients NULL: not wanted */
+} link_batch;
+
+static batten_status ask_links(const stack *s, batten_context *ctx, size_t at, size_t count, const link_batch *b,
+                               const double *places, double *values, double *gradients) {
+  double t = s->sections[at].t, gap = s->sections[at + 1].t - t;
+  for (size_t i = 0; i < count; i++) {
+    size_t p = b->index[i];
+    memcpy(b->x + 2 * i, places + 3 * p, 2 * sizeof *b->x);
+    b->u[i] = (places[3 * p + 2] - t) / gap;
+    b->values[i] = values[p];
+    if (!gradients) continue;
+    memcpy(b->gradients + 3 * i, gradients + 3 * p, 3 * sizeof *gradients);
+    b->gradients[3 * i + 2] *= gap;
+  }
+  batten_status st = stack_link_evaluate(s, ctx, at, count, b->x, b->u, b->values, b->gradients);
+  for (size_t i = 0; i < count && st >= 0; i++) {
+    size_t p = b->index[i];
+    if (b->values[i] == values[p]) continue; /* no link, and its gradient keeps its bits */
+    values[p] = b->values[i];
+    if (!gradients) continue;
+    memcpy(gradients + 3 * p, b->gradients + 3 * i, 3 * sizeof *gradients);
+    gradients[3 * p + 2] /= gap;
+  }
+  return st;
+}
+
+static batten_status join_links(const stack *s, batten_context *ctx, size_t count, const double *places,
+                                double *values, double *gradients) {
+  size_t n = count < BATCH ? count : BATCH;
+  batten_status st = BATTEN_E_NOMEM;
+  link_batch b = {.index = batten_alloc_array(ctx, n, sizeof *b.index)};
+  b.x = batten_alloc_array(ctx, n, 2 * sizeof *b.x);
+  b.u = batten_alloc_array(ctx, n, sizeof *b.u);
+  b.values = batten_alloc_array(ctx, n, sizeof *b.values);
+  if (gradients) b.gradients = batten_alloc_array(ctx, n, 3 * sizeof *b.gradients);
+  if (!b.index || !b.x || !b.u || !b.values || (gradients && !b.gradients)) goto done;
+  st = BATTEN_OK;
+  for (size_t k = 0; k < s->link_count && st >= 0; k++) { /* by section: the links of one are asked together */
+    size_t at = s->links[k].section, asked = 0;
+    if (k > 0 && s->links[k - 1].section == at) continue;
+    for (size_t p = 0; p < count && st >= 0; p++) {
+      if (places[3 * p + 2] > s->sections[at].t && places[3 * p + 2] < s->sections[at + 1].t)
+        b.index[asked++] = (uint32_t)p; /* on the planes links add nothing */
+      if (asked < n && p + 1 < count) continue;
+      if (asked) st = ask_links(s, ctx, at, asked, &b, places, values, gradients);
+      asked = 0;
+    }
+  }
+done:
+  batten_free(ctx, b.index);
+  batten_free(ctx, b.x);
+  batten_free(ctx, b.u);
+  batten_free(ctx, b.values);
+  batten_free(ctx, b.gradients);
+  return st;
+}
+
 batten_status stack_blend(const stack *s, batten_context *ctx, size_t count, const double *places, double *values,
                           double *gradients) {
   if (count == 0) return BATTEN_OK;
@@ -271,6 +334,7 @@ batten_status stack_blend(const stack *s, batten_context *ctx, size_t count, con
     batch.gradients = gradients ? gradients + 3 * from : NULL;
     st = batten_sort_points(ctx, 3, some, batch.places, order);
     if (st >= 0) st = blend_block(&batch, ctx, some);
+    if (st >= 0 && s->link_count) st = join_links(s, ctx, some, batch.places, batch.values, batch.gradients);
   }
   batten_free(ctx, order);
   batch_free(ctx, &batch);

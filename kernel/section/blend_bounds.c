@@ -118,6 +118,40 @@ static batten_status bounds_block(bounds_batch *b, batten_context *ctx, size_t c
   return BATTEN_OK;
 }
 
+/* Links reach no higher than this: the upper ends of ranges [count] rise where boxes lie between their sections. */
+static batten_status join_links(const stack *s, batten_context *ctx, size_t count, const double *boxes,
+                                double *ranges) {
+  size_t n = count < BATCH ? count : BATCH;
+  batten_status st = BATTEN_E_NOMEM;
+  double *parts = batten_alloc_array(ctx, n, 6 * sizeof *parts), *upper = batten_alloc_array(ctx, n, sizeof *upper);
+  uint32_t *index = batten_alloc_array(ctx, n, sizeof *index);
+  if (!parts || !upper || !index) goto done;
+  st = BATTEN_OK;
+  for (size_t k = 0; k < s->link_count && st >= 0; k++) {
+    size_t at = s->links[k].section, asked = 0;
+    double t0 = s->sections[at].t, t1 = s->sections[at + 1].t;
+    if (k > 0 && s->links[k - 1].section == at) continue;
+    for (size_t i = 0; i < count && st >= 0; i++) {
+      const double *box = boxes + 6 * i;
+      if (box[2] < t1 && box[5] > t0) {
+        double u0 = fmax(0, (box[2] - t0) / (t1 - t0)), u1 = fmin(1, (box[5] - t0) / (t1 - t0));
+        memcpy(parts + 6 * asked, (double[6]){box[0], box[1], u0, box[3], box[4], u1}, 6 * sizeof *parts);
+        index[asked++] = (uint32_t)i;
+      }
+      if (asked == 0 || (asked < n && i + 1 < count)) continue;
+      st = stack_link_bounds(s, ctx, at, asked, parts, upper);
+      for (size_t j = 0; j < asked && st >= 0; j++)
+        ranges[2 * index[j] + 1] = fmax(ranges[2 * index[j] + 1], upper[j]);
+      asked = 0;
+    }
+  }
+done:
+  batten_free(ctx, parts);
+  batten_free(ctx, upper);
+  batten_free(ctx, index);
+  return st;
+}
+
 batten_status stack_blend_bounds(const stack *s, batten_context *ctx, size_t count, const double *boxes,
                                  double *ranges) {
   if (count == 0) return BATTEN_OK;
@@ -142,6 +176,7 @@ batten_status stack_blend_bounds(const stack *s, batten_context *ctx, size_t cou
     b.ranges = ranges + 2 * from;
     st = batten_sort_points(ctx, 6, some, keys, order);
     if (st >= 0) st = bounds_block(&b, ctx, some);
+    if (st >= 0 && s->link_count) st = join_links(s, ctx, some, boxes + 6 * from, ranges + 2 * from);
   }
 done:
   batten_free(ctx, keys);

@@ -297,6 +297,66 @@ static void test_bounds(batten_context *ctx, int kind, int rule, bool exact) {
   stack_scene_free(&scene);
 }
 
+/* Discs in a slanted row that do not overlap: joined by links, which leave the sections as they are. */
+static void test_links(batten_context *ctx) {
+  enum { PLACES = 2000, BOXES = 200, TRIES = 20 };
+  static double p[3 * PLACES], f[PLACES], g[PLACES], gradients[3 * PLACES], boxes[6 * BOXES], ranges[2 * BOXES];
+  stack_scene scene = {0};
+  stack s;
+  stack_notes notes = {.ctx = ctx};
+  size_t pieces = 0, apart = 0, same = 0, planes = 0, outside = 0;
+  batten_stack_options o = batten_stack_options_default();
+  stack_scene_shifted(&scene, 4, 1, 3, 2, 32);
+  T_OK(rig_exact(ctx, &scene, &o, &s), ctx);
+  uint64_t seed = 8;
+  for (size_t i = 0; i < PLACES; i++) {
+    p[3 * i] = 13 * t_uniform(&seed) - 2;
+    p[3 * i + 1] = 4 * t_uniform(&seed) - 2;
+    p[3 * i + 2] = i % 4 == 0 ? (double)(i % 8) / 4 * 2 : 6 * t_uniform(&seed);
+  }
+  double before = at(ctx, &s, 1.5, 0, 1), worst = 0, h = 1e-6;
+  T_OK(stack_blend(&s, ctx, PLACES, p, f, NULL), ctx);
+  T_OK(stack_find_components(ctx, &s, true, &notes, &pieces, &apart), ctx);
+  T_CHECK(s.link_count == 3 && before < 0 && at(ctx, &s, 1.5, 0, 1) > 0, "three links; half-way %.3f becomes %.3f",
+          before, at(ctx, &s, 1.5, 0, 1));
+  T_OK(stack_blend(&s, ctx, PLACES, p, g, gradients), ctx);
+  for (size_t i = 0; i < PLACES; i++) {
+    if (i % 4 == 0) planes++, same += f[i] == g[i];
+    if (i % 4 == 0 || i > 800 || fabs(p[3 * i + 1]) < 0.01) continue;
+    double two[6], v[2];
+    for (size_t k = 0; k < 3; k++) {
+      memcpy(two, p + 3 * i, 3 * sizeof *two);
+      memcpy(two + 3, p + 3 * i, 3 * sizeof *two);
+      two[k] -= h, two[3 + k] += h;
+      stack_blend(&s, ctx, 2, two, v, NULL);
+      double off = fabs((v[1] - v[0]) / (2 * h) - gradients[3 * i + k]);
+      if (off > 1e-4) outside++; /* a kink between */
+      if (off <= 1e-4) worst = fmax(worst, off);
+    }
+  }
+  T_CHECK(same == planes, "  %zu of %zu places in the planes keep their bits", same, planes);
+  T_CHECK(outside <= 2, "  gradients against differences: %.2g, and %zu at kinks", worst, outside);
+  for (size_t i = 0; i < BOXES; i++)
+    for (size_t k = 0; k < 3; k++) {
+      boxes[6 * i + k] = p[3 * i + k];
+      boxes[6 * i + 3 + k] = fmin(p[3 * i + k] + t_uniform(&seed), k == 2 ? 6 : 20);
+    }
+  T_OK(stack_blend_bounds(&s, ctx, BOXES, boxes, ranges), ctx);
+  outside = 0;
+  for (int j = 0; j < TRIES; j++) {
+    for (size_t i = 0; i < 3 * BOXES; i++) {
+      const double *box = boxes + 6 * (i / 3) + i % 3;
+      p[i] = fmin(box[0] + (box[3] - box[0]) * t_uniform(&seed), box[3]);
+    }
+    stack_blend(&s, ctx, BOXES, p, f, NULL);
+    for (size_t i = 0; i < BOXES; i++) outside += !(f[i] >= ranges[2 * i] && f[i] <= ranges[2 * i + 1]);
+  }
+  T_CHECK(outside == 0, "  %zu of %d values outside of bounds", outside, BOXES * TRIES);
+  batten_free(ctx, notes.items);
+  rig_release(&s);
+  stack_scene_free(&scene);
+}
+
 static stack *shared;
 static batten_status call_all(batten_context *ctx, void *arg) {
   const double p[6] = {1, 0, 1, 1, 2, -1}, box[6] = {0, 0, 0, 1, 1, 1};
@@ -325,6 +385,7 @@ int main(void) {
     test_bounds(ctx, kind, kind % 4, false);
     test_bounds(ctx, kind, (kind + 2) % 4, true);
   }
+  test_links(ctx);
   const double radii[3] = {2, 3, 2.5};
   stack_scene scene = {0};
   stack s;
