@@ -18,6 +18,12 @@
 
 /* ---- normalize ------------------------------------------------------------------------------------------ */
 
+typedef struct normalized {
+  double limit;              /* L */
+  double lower[3], upper[3]; /* of the child, where boxed */
+  bool boxed;
+} normalized;
+
 static double norm(size_t n, const double *v) {
   double sum = 0;
   for (size_t k = 0; k < n; k++) sum += v[k] * v[k];
@@ -34,7 +40,7 @@ static double bounded_ratio(double f, double slope, double limit) {
 static batten_status normalize_gradients(const batten_frep *a, batten_context *ctx, size_t count,
                                          const double *points, const double *f, double *gradients, double *work) {
   const size_t n = a->n, all = n * count;
-  const double limit = *(const double *)a->state;
+  const double limit = ((const normalized *)a->state)->limit;
   double *ahead = work, *behind = work + all, *ahead_gradient = behind + all, *behind_gradient = ahead_gradient + all;
   for (size_t i = 0; i < count; i++) {
     double slope = norm(n, gradients + n * i),
@@ -66,7 +72,7 @@ static batten_status normalize_gradients(const batten_frep *a, batten_context *c
 static batten_status normalize_evaluate(const batten_frep *a, batten_context *ctx, size_t count, const double *points,
                                         double *values, double *gradients) {
   const size_t n = a->n;
-  const double limit = *(const double *)a->state;
+  const double limit = ((const normalized *)a->state)->limit;
   double *work = batten_alloc_array(ctx, count * n, (gradients ? 4 : 1) * sizeof *work), *g = gradients;
   if (!work) return BATTEN_E_NOMEM;
   if (!g) g = work;
@@ -86,7 +92,7 @@ static batten_status normalize_evaluate(const batten_frep *a, batten_context *ct
 
 static batten_status normalize_bounds(const batten_frep *a, batten_context *ctx, size_t count, const double *boxes,
                                       double *ranges) {
-  const double limit = *(const double *)a->state;
+  const double limit = ((const normalized *)a->state)->limit;
   double *slopes = batten_alloc_array(ctx, count, sizeof *slopes);
   if (!slopes) return BATTEN_E_NOMEM;
   batten_status st = frep_bounds_block(a->children[0], ctx, count, boxes, ranges);
@@ -103,31 +109,43 @@ static batten_status normalize_bounds(const batten_frep *a, batten_context *ctx,
   return st;
 }
 
-static bool child_box(const batten_frep *a, double *lower, double *upper) {
-  return frep_structural_box(a->children[0], lower, upper);
+static bool normalize_box(const batten_frep *a, double *lower, double *upper) {
+  const normalized *state = a->state;
+  if (!state->boxed) return frep_structural_box(a->children[0], lower, upper);
+  for (unsigned k = 0; k < a->n; k++) {
+    lower[k] = state->lower[k];
+    upper[k] = state->upper[k];
+  }
+  return true;
 }
 
-/* What |N| is bounded by: ten diagonals of what the leaves tell; where they tell nothing, no size of anybody's. */
-static double normalize_limit(const batten_frep *a) {
+/* The child's box by its bounds, which are better than those of N; and what |N| is bounded by: ten diagonals of what
+ * the leaves tell; where they tell nothing, no size of anybody's. */
+static batten_status measure(batten_context *ctx, const batten_frep *a, normalized *state) {
   double lower[3], upper[3], diagonal = 0;
-  if (!frep_hint_box(a, lower, upper)) return 1e30;
-  for (unsigned k = 0; k < a->n; k++) diagonal = hypot(diagonal, upper[k] - lower[k]);
-  return diagonal > 0 && isfinite(diagonal) ? 10 * diagonal : 1e30;
+  state->limit = 1e30;
+  if (frep_hint_box(a, lower, upper)) {
+    for (unsigned k = 0; k < a->n; k++) diagonal = hypot(diagonal, upper[k] - lower[k]);
+    if (diagonal > 0 && isfinite(diagonal)) state->limit = 10 * diagonal;
+  }
+  batten_status st = batten_frep_box(ctx, a, state->lower, state->upper);
+  state->boxed = st >= 0;
+  return batten_expect(ctx, st, BATTEN_E_NOT_FOUND);
 }
 
 batten_status batten_frep_normalize(batten_context *ctx, batten_frep *a, batten_frep **out) {
   batten_status st = frep_check_out(ctx, out);
   if (st >= 0) st = frep_check_node(ctx, "a", a, 0);
   if (st < 0) return st;
-  double *limit = batten_alloc(ctx, sizeof *limit);
-  if (!limit) return BATTEN_E_NOMEM;
-  *limit = normalize_limit(a);
+  normalized *state = batten_alloc(ctx, sizeof *state);
+  if (!state) return BATTEN_E_NOMEM;
+  st = measure(ctx, a, state);
   batten_frep_parts parts = {.n = a->n, .child_count = 1, .children = {a}};
-  st = frep_make(ctx, &frep_class_normalize, &parts, false, limit, out);
+  if (st >= 0) st = frep_make(ctx, &frep_class_normalize, &parts, false, state, out);
   if (st >= 0)
     (*out)->normal = true;
   else
-    batten_free(ctx, limit);
+    batten_free(ctx, state);
   return st;
 }
 
@@ -140,7 +158,7 @@ const frep_class frep_class_normalize = {.kind = BATTEN_FREP_KIND_NORMALIZE,
                                          .name = "normalize",
                                          .evaluate = normalize_evaluate,
                                          .bounds = normalize_bounds,
-                                         .box = child_box,
+                                         .box = normalize_box,
                                          .create = create_normalize};
 
 /* ---- offset and shell ------------------------------------------------------------------------------------ */

@@ -11,8 +11,9 @@
 #include "frep/frep_inner.h"
 
 enum {
-  BOX_LIMIT = 1 << 18, /* boxes in the list: a surface of 200 x 200 tiles on each side has as many */
-  BOX_ROUNDS = 200     /* rounds of halving: 20 for a million along each axis, and 7 for a hundredth, three times */
+  BOX_LIMIT = 1 << 18,            /* boxes in the list: a surface of 200 x 200 tiles on each side has as many */
+  BOX_LIMIT_STRUCTURAL = 1 << 15, /* where the structure's box will do when bounds are too wide to make it tighter */
+  BOX_ROUNDS = 200 /* rounds of halving: 20 for a million along each axis, and 7 for a hundredth, three times */
 };
 #define BOX_TIGHT 0.005 /* of the largest extent: how far a box may stick out of what is known to be inside */
 #define BOX_SLACK 0.004 /* of it, added at last: the surface shall not lie on a face, where a mesh would be cut */
@@ -189,8 +190,9 @@ batten_status batten_frep_box(batten_context *ctx, const batten_frep *a, double 
   s.values = s.ranges + 2 * FREP_BLOCK;
   s.middles = s.values + FREP_BLOCK;
   memcpy(s.boxes, start, 2 * n * sizeof *start);
+  const size_t limit = structural ? BOX_LIMIT_STRUCTURAL : BOX_LIMIT;
   st = judge(&s, ctx, 0, 1, &s.count);
-  for (int round = 0; st >= 0 && !done && round < BOX_ROUNDS && s.count <= BOX_LIMIT / 2; round++) {
+  for (int round = 0; st >= 0 && !done && round < BOX_ROUNDS && s.count <= limit / 2; round++) {
     st = batten_progress(ctx, "box", (double)round / BOX_ROUNDS);
     if (st >= 0) st = refine(&s, ctx, &done);
   }

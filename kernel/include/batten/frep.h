@@ -78,7 +78,7 @@ BATTEN_API batten_status batten_frep_blend(batten_context *ctx, batten_frep_oper
  * put below f unless the node is a distance already (leaves that say so, and what moves, mirrors, offsets, unites,
  * intersects (alpha = 1) or negates them), or normalized. The gradient takes two more gradients of f. Bounds are
  * narrow only where the slope of f is bounded too, which it is not for reconstructed solids: there they tell the
- * sign alone. */
+ * sign alone. Making one looks for the box of the node (batten_frep_box). */
 BATTEN_API batten_status batten_frep_normalize(batten_context *ctx, batten_frep *a, batten_frep **out);
 /* Is |f| at most the distance to the surface, and equal to it near the surface? Known by construction. */
 BATTEN_API int batten_frep_is_distance(const batten_frep *a);
