@@ -43,6 +43,7 @@ batten_status bx_read_points_from(bx_reader *r, bx_format format, unsigned n, ba
 batten_status bx_read_mesh_from(bx_reader *r, bx_format format, batten_mesh **out);
 batten_status bx_load_solid_from(bx_reader *r, batten_solid **out);
 batten_status bx_load_carrier_from(bx_reader *r, batten_carrier **out);
+batten_status bx_load_frep_from(bx_reader *r, batten_frep **out);
 batten_status bx_read_qp_from(bx_reader *r, bx_format format, batten_qp_file *out);
 batten_status bx_read_network_from(bx_reader *r, batten_network **out);
 batten_status bx_read_surface_from(bx_reader *r, batten_surface **out);

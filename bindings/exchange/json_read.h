@@ -10,6 +10,7 @@ typedef struct bx_json {
   batten_context *ctx;
   const char *path;
   char place[192]; /* of the value in hand */
+  unsigned level;  /* of nodes in nodes: json_scene.c */
 } bx_json;
 
 /* Opens path, which must be .json, also .gz; what: "surfaces". INVALID for out = NULL and other extensions. */

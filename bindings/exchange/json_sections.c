@@ -5,7 +5,7 @@
  *
  * What the numbers mean, whether rotations are some and contours cross, is for batten_stack_build to judge. */
 #include "format.h"
-#include "json_read.h"
+#include "json_solid.h"
 #include "sections.h"
 #include "write.h"
 
@@ -43,7 +43,7 @@ static batten_status count_points(bx_json *j, const json_t *contours, size_t *po
   return st;
 }
 
-static batten_status get_section(bx_json *j, const json_t *object, batten_section *out) {
+batten_status bx_get_section(bx_json *j, const json_t *object, batten_section *out) {
   json_t *contours = NULL;
   size_t points = 0;
   batten_status st = bx_get_numbers(j, object, "origin", 3, out->origin);
@@ -79,7 +79,7 @@ static batten_status get_sections(bx_json *j, const json_t *root, batten_section
     bx_enter_item(j, i);
     out->sections[i] = (batten_section){.contour_count = 0};
     out->count++;
-    st = get_section(j, json_array_get(array, i), &out->sections[i]);
+    st = bx_get_section(j, json_array_get(array, i), &out->sections[i]);
     bx_leave(j, mark);
     if (st == BATTEN_OK && i % 64 == 0) st = batten_progress(j->ctx, "read", (double)i / (double)count);
   }
@@ -117,8 +117,8 @@ static batten_status check_section(batten_context *ctx, size_t i, const batten_s
   return frame ? BATTEN_OK : batten_fail(ctx, BATTEN_E_INVALID, "sections[%zu]: its frame is not finite", i);
 }
 
-static void put_section(bx_writer *w, const batten_section *s) {
-  bx_put_text(w, "{\"origin\": ");
+void bx_put_section_members(bx_writer *w, const batten_section *s) {
+  bx_put_text(w, "\"origin\": ");
   bx_put_json_numbers(w, s->origin, 3);
   bx_put_text(w, ", \"rotation\": ");
   bx_put_json_rows(w, s->rotation[0], 3, 3, ", ");
@@ -127,7 +127,7 @@ static void put_section(bx_writer *w, const batten_section *s) {
     bx_put_text(w, i ? ",\n" : "");
     bx_put_json_rows(w, s->points + 2 * s->starts[i], s->starts[i + 1] - s->starts[i], 2, ",\n");
   }
-  bx_put_text(w, "]}");
+  bx_put_text(w, "]");
 }
 
 batten_status batten_write_sections(batten_context *ctx, size_t count, const batten_section *sections,
@@ -143,8 +143,9 @@ batten_status batten_write_sections(batten_context *ctx, size_t count, const bat
   if (st != BATTEN_OK) return st;
   bx_put_text(&w, "{\"batten\": \"sections\", \"version\": 1,\n\"sections\": [\n");
   for (size_t i = 0; i < count && bx_goes_on(&w, i, count); i++) {
-    if (i) bx_put_text(&w, ",\n");
-    put_section(&w, &sections[i]);
+    bx_put_text(&w, i ? ",\n{" : "{");
+    bx_put_section_members(&w, &sections[i]);
+    bx_put_u8(&w, '}');
   }
   bx_put_text(&w, "]}\n");
   return bx_commit(&w);

@@ -2,17 +2,34 @@
  * document; what numbers mean is checked by the kernel's constructors, whose texts are passed on behind the place. */
 #include "format.h"
 #include "json_carrier.h"
-#include "json_read.h"
+#include "json_solid.h"
 
 #include <stdio.h>
 #include <string.h>
 
-/* The kernel found something wrong with values that are well-formed. */
-static batten_status explain(bx_json *j, batten_status st) {
+batten_status bx_explain(bx_json *j, batten_status st) {
   return st == BATTEN_E_INVALID ? bx_json_fail(j, "%s", batten_error(j->ctx)) : st;
 }
 
-static batten_status get_dimension(bx_json *j, const json_t *object, unsigned *n) {
+batten_status bx_get_choice(bx_json *j, const json_t *object, const char *key, size_t count, const char *const *names,
+                            int *out) {
+  const char *text = "";
+  char quote[BX_QUOTE_SIZE];
+  if (!json_object_get(object, key)) return BATTEN_OK;
+  batten_status st = bx_get_text(j, object, key, &text);
+  if (st != BATTEN_OK) return st;
+  for (size_t i = 0; i < count; i++)
+    if (!strcmp(text, names[i])) {
+      *out = (int)i;
+      return BATTEN_OK;
+    }
+  char list[128] = "";
+  for (size_t i = 0, used = 0; i < count && used < sizeof list; i++)
+    used += (size_t)snprintf(list + used, sizeof list - used, "%s%s", i ? ", " : "", names[i]);
+  return bx_json_fail(j, "'%s' is '%s', which is none of %s", key, bx_quote(text, strlen(text), quote), list);
+}
+
+batten_status bx_get_dimension(bx_json *j, const json_t *object, unsigned *n) {
   int64_t value = 0;
   batten_status st = bx_get_whole(j, object, "n", 1, 3, &value);
   if (st == BATTEN_OK) *n = (unsigned)value;
@@ -68,7 +85,7 @@ static batten_status load_spline(bx_json *j, const json_t *object, batten_spline
   batten_spline_parts p = {.struct_size = sizeof p};
   spline_arrays a = {0};
   int64_t m = 0;
-  batten_status st = get_dimension(j, object, &p.n);
+  batten_status st = bx_get_dimension(j, object, &p.n);
   if (st == BATTEN_OK) st = bx_get_whole(j, object, "m", 1, 4, &m);
   if (st == BATTEN_OK) st = bx_get_numbers(j, object, "origin", p.n, p.origin);
   if (st == BATTEN_OK) st = bx_get_number(j, object, "scale", &p.scale);
@@ -80,7 +97,7 @@ static batten_status load_spline(bx_json *j, const json_t *object, batten_spline
     p.polynomial = a.polynomial;
     p.gradient_at = a.gradient_at;
     p.gradient_coefficients = a.gradient_coefficients;
-    st = explain(j, batten_spline_create(j->ctx, &p, out));
+    st = bx_explain(j, batten_spline_create(j->ctx, &p, out));
   }
   batten_free(j->ctx, a.centers);
   batten_free(j->ctx, a.coefficients);
@@ -93,12 +110,12 @@ static batten_status load_spline(bx_json *j, const json_t *object, batten_spline
 
 /* ---- carriers and solids, which nest ------------------------------------------------------------ */
 
-static batten_status load_solid_members(bx_json *j, const json_t *object, unsigned depth, batten_solid **out);
-static batten_status load_carrier(bx_json *j, const json_t *object, unsigned n, unsigned depth, batten_carrier **out);
-
+/* [n][n]; left out: the identity. */
 static batten_status get_matrix(bx_json *j, const json_t *object, const char *key, unsigned n, double *out) {
   double *rows = NULL;
   size_t count = 0;
+  for (unsigned i = 0; i < n * n; i++) out[i] = i % (n + 1) == 0;
+  if (!json_object_get(object, key)) return BATTEN_OK;
   batten_status st = bx_get_rows(j, object, key, n, &count, &rows);
   if (st == BATTEN_OK) st = check_count(j, key, count, "n", n);
   if (st == BATTEN_OK) memcpy(out, rows, (size_t)n * n * sizeof *out);
@@ -114,7 +131,9 @@ static batten_status get_members(bx_json *j, const json_t *object, const bx_carr
     const char *key = layout->members[i].name;
     switch (layout->members[i].shape) {
       case BX_NUMBER:
-        st = bx_get_number(j, object, key, values + *count);
+        values[*count] = 0;
+        if (json_object_get(object, key) || strcmp(key, "rounding"))
+          st = bx_get_number(j, object, key, values + *count);
         *count += 1;
         break;
       case BX_VECTOR:
@@ -138,7 +157,7 @@ static batten_status get_children(bx_json *j, const json_t *object, unsigned n, 
   for (size_t i = 0; st == BATTEN_OK && i < 2; i++) {
     size_t mark = bx_enter(j, "children");
     bx_enter_item(j, i);
-    st = load_carrier(j, json_array_get(array, i), n, depth + 1, &children[i]);
+    st = bx_load_carrier(j, json_array_get(array, i), n, depth + 1, &children[i]);
     bx_leave(j, mark);
   }
   return st;
@@ -149,20 +168,13 @@ static batten_status get_nested_solid(bx_json *j, const json_t *object, unsigned
   batten_status st = bx_get(j, object, "solid", &nested);
   if (st != BATTEN_OK) return st;
   size_t mark = bx_enter(j, "solid");
-  st = load_solid_members(j, nested, depth + 1, out);
+  st = bx_load_solid_members(j, nested, depth + 1, out);
   bx_leave(j, mark);
   return st;
 }
 
-/* Recursion no deeper than BX_CARRIER_DEPTH. */
-static batten_status load_carrier(bx_json *j, const json_t *object, unsigned n, unsigned depth,
-                                  batten_carrier **out) {
-  enum { VALUES_MAX = 16 }; /* of a box in space: 3 + 3 + 9 + 1 */
-  double values[VALUES_MAX];
-  batten_carrier *children[2] = {NULL, NULL};
-  batten_solid *solid = NULL;
+batten_status bx_load_carrier(bx_json *j, const json_t *object, unsigned n, unsigned depth, batten_carrier **out) {
   const char *kind = "";
-  if (depth >= BX_CARRIER_DEPTH) return bx_json_fail(j, "nested deeper than %d", BX_CARRIER_DEPTH);
   batten_status st = bx_get_text(j, object, "kind", &kind);
   if (st != BATTEN_OK) return st;
   const bx_carrier_layout *layout = bx_layout_named(kind);
@@ -172,15 +184,26 @@ static batten_status load_carrier(bx_json *j, const json_t *object, unsigned n, 
                         "kind '%s' is not none, ball, ellipsoid, box, cylinder, torus, half-space, union, "
                         "intersection or solid",
                         bx_quote(kind, strlen(kind), quote));
+  return bx_load_carrier_members(j, object, layout, n, depth, out);
+}
+
+/* Recursion no deeper than BX_CARRIER_DEPTH. */
+batten_status bx_load_carrier_members(bx_json *j, const json_t *object, const bx_carrier_layout *layout, unsigned n,
+                                      unsigned depth, batten_carrier **out) {
+  enum { VALUES_MAX = 16 }; /* of a box in space: 3 + 3 + 9 + 1 */
+  double values[VALUES_MAX];
+  batten_carrier *children[2] = {NULL, NULL};
+  batten_solid *solid = NULL;
+  if (depth >= BX_CARRIER_DEPTH) return bx_json_fail(j, "nested deeper than %d", BX_CARRIER_DEPTH);
   batten_carrier_parts p = {.kind = layout->kind, .n = n, .parameters = values};
-  st = get_members(j, object, layout, n, values, &p.parameter_count);
+  batten_status st = get_members(j, object, layout, n, values, &p.parameter_count);
   if (st == BATTEN_OK && layout->child_count) st = get_children(j, object, n, depth, children);
   if (st == BATTEN_OK && layout->kind == BATTEN_CARRIER_SOLID) st = get_nested_solid(j, object, depth, &solid);
   if (st == BATTEN_OK) {
     p.children[0] = children[0];
     p.children[1] = children[1];
     p.solid = solid;
-    st = explain(j, batten_carrier_create(j->ctx, &p, out));
+    st = bx_explain(j, batten_carrier_create(j->ctx, &p, out));
   }
   batten_carrier_free(children[0]);
   batten_carrier_free(children[1]);
@@ -203,19 +226,19 @@ static batten_status get_carrier(bx_json *j, const json_t *object, unsigned n, u
   batten_status st = bx_get(j, object, "carrier", &carrier);
   if (st != BATTEN_OK) return st;
   size_t mark = bx_enter(j, "carrier");
-  st = load_carrier(j, carrier, n, depth, out);
+  st = bx_load_carrier(j, carrier, n, depth, out);
   bx_leave(j, mark);
   return st;
 }
 
-static batten_status load_solid_members(bx_json *j, const json_t *object, unsigned depth, batten_solid **out) {
+static batten_status load_spline_solid(bx_json *j, const json_t *object, unsigned depth, batten_solid **out) {
   unsigned n = 0;
   int64_t sign = 0;
   size_t count = 0;
   double lower[3], upper[3], *points = NULL;
   batten_spline *spline = NULL;
   batten_carrier *carrier = NULL;
-  batten_status st = get_dimension(j, object, &n);
+  batten_status st = bx_get_dimension(j, object, &n);
   if (st == BATTEN_OK) st = bx_get_whole(j, object, "sign", -1, 1, &sign);
   if (st == BATTEN_OK) st = bx_get_numbers(j, object, "lower", n, lower);
   if (st == BATTEN_OK) st = bx_get_numbers(j, object, "upper", n, upper);
@@ -223,11 +246,23 @@ static batten_status load_solid_members(bx_json *j, const json_t *object, unsign
   if (st == BATTEN_OK) st = get_carrier(j, object, n, depth, &carrier);
   if (st == BATTEN_OK && json_object_get(object, "points")) st = bx_get_rows(j, object, "points", n, &count, &points);
   if (st == BATTEN_OK)
-    st = explain(j, batten_solid_create(j->ctx, spline, carrier, (int)sign, lower, upper, count, points, out));
+    st = bx_explain(j, batten_solid_create(j->ctx, spline, carrier, (int)sign, lower, upper, count, points, out));
   batten_free(j->ctx, points);
   batten_spline_free(spline);
   batten_carrier_free(carrier);
   return st;
+}
+
+/* Solids of the three kinds nest in each other, through carriers, section functions and leaves of trees. */
+batten_status bx_load_solid_members(bx_json *j, const json_t *object, unsigned depth, batten_solid **out) {
+  static const char *const kinds[] = {"spline", "stack", "tree"};
+  int kind = BATTEN_SOLID_SPLINE;
+  if (depth >= BX_CARRIER_DEPTH) return bx_json_fail(j, "nested deeper than %d", BX_CARRIER_DEPTH);
+  batten_status st = bx_get_choice(j, object, "kind", 3, kinds, &kind);
+  if (st != BATTEN_OK) return st;
+  if (kind == BATTEN_SOLID_STACK) return bx_load_stack(j, object, depth, out);
+  if (kind == BATTEN_SOLID_TREE) return bx_load_tree(j, object, depth, out);
+  return load_spline_solid(j, object, depth, out);
 }
 
 /* ---- documents ---------------------------------------------------------------------------------- */
@@ -238,7 +273,7 @@ batten_status bx_load_solid_from(bx_reader *r, batten_solid **out) {
   batten_status st = bx_json_parse(r, &root);
   if (st == BATTEN_OK) st = bx_check_head(&j, root, "solid");
   snprintf(j.place, sizeof j.place, "solid");
-  if (st == BATTEN_OK) st = load_solid_members(&j, root, 0, out);
+  if (st == BATTEN_OK) st = bx_load_solid_members(&j, root, 0, out);
   json_decref(root);
   return st;
 }
@@ -249,7 +284,7 @@ batten_status bx_load_carrier_from(bx_reader *r, batten_carrier **out) {
   unsigned n = 0;
   batten_status st = bx_json_parse(r, &root);
   if (st == BATTEN_OK) st = bx_check_head(&j, root, "carrier");
-  if (st == BATTEN_OK) st = get_dimension(&j, root, &n);
+  if (st == BATTEN_OK) st = bx_get_dimension(&j, root, &n);
   j.place[0] = '\0';
   if (st == BATTEN_OK) st = get_carrier(&j, root, n, 0, out);
   json_decref(root);

@@ -10,6 +10,7 @@
  * library's tree of a large solid would take ten times its memory. */
 #include "format.h"
 #include "json_carrier.h"
+#include "json_solid.h"
 #include "write.h"
 
 #include <string.h>
@@ -55,15 +56,15 @@ const bx_carrier_layout *bx_layout_named(const char *kind_name) {
 
 /* Before a file is opened: is there a callback? The kernel nests no deeper than BX_CARRIER_DEPTH, so this recursion,
  * and that of writing, goes no deeper either. */
-static batten_status check_carrier(batten_context *ctx, const batten_carrier *carrier);
+batten_status bx_check_carrier(batten_context *ctx, const batten_carrier *carrier);
 
 static batten_status check_solid(batten_context *ctx, const batten_solid *solid) {
-  if (batten_solid_kind_of(solid) == BATTEN_SOLID_SPLINE) return check_carrier(ctx, batten_solid_carrier(solid));
+  if (batten_solid_kind_of(solid) == BATTEN_SOLID_SPLINE) return bx_check_carrier(ctx, batten_solid_carrier(solid));
   return batten_fail(ctx, BATTEN_E_INVALID,
                      "solid: of sections or other solids; only a solid fitted to surface points can be saved");
 }
 
-static batten_status check_carrier(batten_context *ctx, const batten_carrier *carrier) {
+batten_status bx_check_carrier(batten_context *ctx, const batten_carrier *carrier) {
   batten_carrier_parts parts;
   batten_carrier_get_parts(carrier, &parts);
   if (!bx_layout_of(parts.kind))
@@ -72,7 +73,7 @@ static batten_status check_carrier(batten_context *ctx, const batten_carrier *ca
                        "another carrier",
                        batten_carrier_kind_name(parts.kind));
   batten_status st = BATTEN_OK;
-  for (int i = 0; st == BATTEN_OK && i < 2 && parts.children[i]; i++) st = check_carrier(ctx, parts.children[i]);
+  for (int i = 0; st == BATTEN_OK && i < 2 && parts.children[i]; i++) st = bx_check_carrier(ctx, parts.children[i]);
   if (st == BATTEN_OK && parts.solid) st = check_solid(ctx, parts.solid);
   return st;
 }
@@ -80,7 +81,7 @@ static batten_status check_carrier(batten_context *ctx, const batten_carrier *ca
 /* ---- writing ------------------------------------------------------------------------------------ */
 
 /* One row a line. */
-static void put_rows(bx_writer *w, const double *values, size_t rows, size_t width) {
+void bx_put_solid_rows(bx_writer *w, const double *values, size_t rows, size_t width) {
   bx_put_u8(w, '\n');
   bx_put_json_rows(w, values, rows, width, ",\n");
 }
@@ -98,19 +99,17 @@ static void put_spline(bx_writer *w, const batten_spline *spline) {
     bx_put_text(w, ",\n\"gradient_at\": [");
     for (size_t i = 0; i < p.gradient_count; i++) bx_print(w, i ? ", %zu" : "%zu", p.gradient_at[i]);
     bx_put_text(w, "],\n\"gradient_coefficients\": ");
-    put_rows(w, p.gradient_coefficients, p.gradient_count, p.n);
+    bx_put_solid_rows(w, p.gradient_coefficients, p.gradient_count, p.n);
   }
   bx_put_text(w, ",\n\"coefficients\": ");
   bx_put_json_numbers(w, p.coefficients, p.count);
   bx_put_text(w, ",\n\"centers\": ");
-  put_rows(w, p.centers, p.count, p.n);
+  bx_put_solid_rows(w, p.centers, p.count, p.n);
   bx_put_text(w, "\n}");
 }
 
-static void put_solid_members(bx_writer *w, const batten_solid *solid);
-
 /* Recursion no deeper than BX_CARRIER_DEPTH. */
-static void put_carrier(bx_writer *w, const batten_carrier *carrier) {
+void bx_put_carrier(bx_writer *w, const batten_carrier *carrier) {
   batten_carrier_parts p;
   batten_carrier_get_parts(carrier, &p);
   const bx_carrier_layout *layout = bx_layout_of(p.kind);
@@ -137,20 +136,20 @@ static void put_carrier(bx_writer *w, const batten_carrier *carrier) {
   }
   if (layout->child_count) {
     bx_put_text(w, ", \"children\": [\n");
-    put_carrier(w, p.children[0]);
+    bx_put_carrier(w, p.children[0]);
     bx_put_text(w, ",\n");
-    put_carrier(w, p.children[1]);
+    bx_put_carrier(w, p.children[1]);
     bx_put_text(w, "]");
   }
   if (p.solid) {
     bx_put_text(w, ", \"solid\": {");
-    put_solid_members(w, p.solid);
+    bx_put_solid_members(w, p.solid);
     bx_put_text(w, "}");
   }
   bx_put_text(w, "}");
 }
 
-static void put_solid_members(bx_writer *w, const batten_solid *solid) {
+static void put_spline_solid(bx_writer *w, const batten_solid *solid) {
   unsigned n = batten_solid_dimension(solid);
   double lower[3], upper[3];
   batten_solid_box(solid, lower, upper);
@@ -159,13 +158,26 @@ static void put_solid_members(bx_writer *w, const batten_solid *solid) {
   bx_put_text(w, ", \"upper\": ");
   bx_put_json_numbers(w, upper, n);
   bx_put_text(w, ",\n\"carrier\": ");
-  put_carrier(w, batten_solid_carrier(solid));
+  bx_put_carrier(w, batten_solid_carrier(solid));
   bx_put_text(w, ",\n\"spline\": ");
   put_spline(w, batten_solid_spline(solid));
   size_t count;
   const double *points = batten_solid_points(solid, &count);
   bx_put_text(w, ",\n\"points\": ");
-  put_rows(w, points, count, n);
+  bx_put_solid_rows(w, points, count, n);
+}
+
+void bx_put_solid_members(bx_writer *w, const batten_solid *solid) {
+  switch (batten_solid_kind_of(solid)) {
+    case BATTEN_SOLID_SPLINE:
+      put_spline_solid(w, solid);
+      break;
+    case BATTEN_SOLID_STACK:
+      bx_put_stack(w, solid);
+      break;
+    case BATTEN_SOLID_TREE:
+      bx_put_tree(w, solid);
+  }
 }
 
 static batten_status check_path(batten_context *ctx, const char *path, const void *what, const char *name) {
@@ -182,7 +194,7 @@ batten_status batten_save_solid(batten_context *ctx, const batten_solid *solid, 
   if (st == BATTEN_OK) st = bx_create(&w, ctx, path);
   if (st != BATTEN_OK) return st;
   bx_put_text(&w, "{\"batten\": \"solid\", \"version\": 1,\n");
-  put_solid_members(&w, solid);
+  bx_put_solid_members(&w, solid);
   bx_put_text(&w, "\n}\n");
   return bx_commit(&w);
 }
@@ -190,13 +202,13 @@ batten_status batten_save_solid(batten_context *ctx, const batten_solid *solid, 
 batten_status batten_save_carrier(batten_context *ctx, const batten_carrier *carrier, const char *path) {
   bx_writer w;
   batten_status st = check_path(ctx, path, carrier, "carrier");
-  if (st == BATTEN_OK) st = check_carrier(ctx, carrier);
+  if (st == BATTEN_OK) st = bx_check_carrier(ctx, carrier);
   if (st == BATTEN_OK) st = bx_create(&w, ctx, path);
   if (st != BATTEN_OK) return st;
   batten_carrier_parts parts;
   batten_carrier_get_parts(carrier, &parts);
   bx_print(&w, "{\"batten\": \"carrier\", \"version\": 1, \"n\": %u,\n\"carrier\": ", parts.n);
-  put_carrier(&w, carrier);
+  bx_put_carrier(&w, carrier);
   bx_put_text(&w, "\n}\n");
   return bx_commit(&w);
 }

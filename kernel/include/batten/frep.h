@@ -172,6 +172,11 @@ BATTEN_API batten_status batten_frep_box(batten_context *ctx, const batten_frep 
  * surface in the box. */
 BATTEN_API batten_status batten_frep_to_solid(batten_context *ctx, batten_frep *a, const double *lower,
                                               const double *upper, double cell, batten_solid **out);
+/* The same from parts, as saved: box and points [count][n] on its surface, at least one, are copied, the tree is
+ * retained. Fails: INVALID, NOMEM. */
+BATTEN_API batten_status batten_frep_solid_create(batten_context *ctx, batten_frep *a, const double *lower,
+                                                  const double *upper, size_t count, const double *points,
+                                                  batten_solid **out);
 /* The tree of such a solid, NULL of others; not retained. */
 BATTEN_API batten_frep *batten_solid_tree(const batten_solid *s);
 
