@@ -1,6 +1,7 @@
 /* batten inspect: what is in a file, and its measures. */
 #include "cli.h"
 #include "curves.h"
+#include "inspect.h"
 #include "network.h"
 #include "qp.h"
 #include "surface.h"
@@ -23,20 +24,13 @@ static void print_help(void) {
       "a network of Bezier triangles (continuity across its edges, curvature), a B-spline surface (whether it is "
       "convex),\n"
       "planar B-spline curves (lengths, areas, curvature, inflections), a solid or a carrier saved by batten,\n"
+      "sections of a solid, a scene of the algebra of solids (its nodes, its box),\n"
       "a quadratic program (its sizes, which engine would solve it).\n\n");
   cli_options_print(table);
   printf("\nexample:\n\n  batten inspect mesh.ply --report mesh.json\n");
 }
 
 /* ---- kinds --------------------------------------------------------------------------------------- */
-
-static void tell_box(cli_report *r, bool print, unsigned n, const double *lower, const double *upper) {
-  cli_report_box(r, n, lower, upper);
-  if (!print) return;
-  printf("%-14s ", "box");
-  for (unsigned k = 0; k < n; k++) printf("%s%.6g .. %.6g", k ? "  x  " : "", lower[k], upper[k]);
-  putchar('\n');
-}
 
 /* In text that parts them, each in its plane; 0 where that is not so. */
 static size_t count_contours(cli_run *run, const char *path) {
@@ -71,7 +65,7 @@ static batten_status tell_points(cli_run *run, const char *path, bool print, cli
              cloud.normals ? ", with normals" : "", cloud.parameters ? ", with parameters" : "",
              cloud.weights ? ", with weights" : "");
   if (print && contours > 1) cli_line("contours", "%zu, each in a plane", contours);
-  tell_box(r, print && cloud.count, cloud.n, lower, upper);
+  inspect_box(r, print && cloud.count, cloud.n, lower, upper);
   batten_cloud_free(run->ctx, &cloud);
   return st;
 }
@@ -183,55 +177,6 @@ static batten_status tell_curves(cli_run *run, const char *path, bool print, cli
   return st;
 }
 
-static void tell_carrier_kind(cli_report *r, bool print, const batten_carrier *carrier) {
-  batten_carrier_parts parts;
-  batten_carrier_get_parts(carrier, &parts);
-  cli_report_text(r, "carrier", batten_carrier_kind_name(parts.kind));
-  if (!print) return;
-  printf("%-14s %s", "carrier", batten_carrier_kind_name(parts.kind));
-  for (size_t i = 0; i < parts.parameter_count && i < 16; i++) printf(" %.6g", parts.parameters[i]);
-  putchar('\n');
-}
-
-static batten_status tell_solid(cli_run *run, const char *path, bool print, cli_report *r) {
-  batten_solid *solid = NULL;
-  batten_status st = batten_load_solid(run->ctx, path, &solid);
-  if (st < 0) return st;
-  batten_spline_parts parts = {.struct_size = sizeof parts};
-  batten_spline_get_parts(batten_solid_spline(solid), &parts);
-  double lower[3], upper[3];
-  batten_solid_box(solid, lower, upper);
-  int power = 2 * (int)parts.m - (int)parts.n;
-  cli_run_clear(run);
-  cli_report_count(r, "dimension", parts.n);
-  cli_report_count(r, "order", parts.m);
-  cli_report_count(r, "centers", parts.count);
-  cli_report_count(r, "gradients", parts.gradient_count);
-  cli_report_integer(r, "sign", batten_solid_sign(solid));
-  if (print) {
-    cli_line("solid", "of dimension %u from %zu centres%s", parts.n, parts.count,
-             parts.gradient_count ? " with gradients" : "");
-    cli_line("kernel", "r^%d%s, polynomial of degree %u", power, parts.n % 2 ? "" : " ln r", parts.m - 1);
-    cli_line("sign", "%+d", batten_solid_sign(solid));
-  }
-  tell_carrier_kind(r, print, batten_solid_carrier(solid));
-  tell_box(r, print, parts.n, lower, upper);
-  batten_solid_free(solid);
-  return st;
-}
-
-static batten_status tell_carrier(cli_run *run, const char *path, bool print, cli_report *r) {
-  batten_carrier *carrier = NULL;
-  batten_status st = batten_load_carrier(run->ctx, path, &carrier);
-  if (st < 0) return st;
-  batten_carrier_parts parts;
-  batten_carrier_get_parts(carrier, &parts);
-  cli_report_count(r, "dimension", parts.n);
-  tell_carrier_kind(r, print, carrier);
-  batten_carrier_free(carrier);
-  return st;
-}
-
 /* The engine that would be taken, and what it would need. */
 static batten_status tell_qp(cli_run *run, const char *path, bool print, cli_report *r) {
   batten_qp_file file = {0};
@@ -264,8 +209,8 @@ static bool no_option(cli_request *q, int key, const char *value) {
 }
 
 static int work(cli_request *q) {
-  static const char *const kinds[] = {"unknown",           "points",  "mesh",    "solid",  "carrier",
-                                      "quadratic program", "network", "surface", "curves", "document"};
+  static const char *const kinds[] = {"unknown", "points",  "mesh",   "solid",    "carrier",  "quadratic program",
+                                      "network", "surface", "curves", "document", "sections", "frep"};
   cli_run run;
   if (!cli_run_open(&run, q->threads, 0, q->quiet)) return CLI_FAILED;
   run.input = q->input;
@@ -289,10 +234,10 @@ static int work(cli_request *q) {
         st = tell_mesh(&run, q->input, print, &report);
         break;
       case BATTEN_FILE_SOLID:
-        st = tell_solid(&run, q->input, print, &report);
+        st = inspect_solid(&run, q->input, print, &report);
         break;
       case BATTEN_FILE_CARRIER:
-        st = tell_carrier(&run, q->input, print, &report);
+        st = inspect_carrier(&run, q->input, print, &report);
         break;
       case BATTEN_FILE_QP:
         st = tell_qp(&run, q->input, print, &report);
@@ -305,6 +250,12 @@ static int work(cli_request *q) {
         break;
       case BATTEN_FILE_CURVES:
         st = tell_curves(&run, q->input, print, &report);
+        break;
+      case BATTEN_FILE_SECTIONS:
+        st = inspect_sections(&run, q->input, print, &report);
+        break;
+      case BATTEN_FILE_FREP:
+        st = inspect_frep(&run, q->input, print, &report);
         break;
       case BATTEN_FILE_DOCUMENT:
         break;

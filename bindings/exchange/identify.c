@@ -36,6 +36,8 @@ static batten_file_kind kind_of_document(const unsigned char *bytes, size_t coun
   if (take_text(bytes, count, &at, "network")) return BATTEN_FILE_NETWORK;
   if (take_text(bytes, count, &at, "surface")) return BATTEN_FILE_SURFACE;
   if (take_text(bytes, count, &at, "curve") || take_text(bytes, count, &at, "contours")) return BATTEN_FILE_CURVES;
+  if (take_text(bytes, count, &at, "sections")) return BATTEN_FILE_SECTIONS;
+  if (take_text(bytes, count, &at, "frep")) return BATTEN_FILE_FREP;
   return BATTEN_FILE_DOCUMENT;
 }
 

@@ -56,12 +56,16 @@ const bx_carrier_layout *bx_layout_named(const char *kind_name) {
 
 /* Before a file is opened: is there a callback? The kernel nests no deeper than BX_CARRIER_DEPTH, so this recursion,
  * and that of writing, goes no deeper either. */
-batten_status bx_check_carrier(batten_context *ctx, const batten_carrier *carrier);
-
-static batten_status check_solid(batten_context *ctx, const batten_solid *solid) {
-  if (batten_solid_kind_of(solid) == BATTEN_SOLID_SPLINE) return bx_check_carrier(ctx, batten_solid_carrier(solid));
-  return batten_fail(ctx, BATTEN_E_INVALID,
-                     "solid: of sections or other solids; only a solid fitted to surface points can be saved");
+batten_status bx_check_solid(batten_context *ctx, const batten_solid *solid) {
+  switch (batten_solid_kind_of(solid)) {
+    case BATTEN_SOLID_STACK:
+      return bx_check_stack(ctx, solid);
+    case BATTEN_SOLID_TREE:
+      return bx_check_nodes(ctx, batten_solid_tree(solid));
+    case BATTEN_SOLID_SPLINE:
+      break;
+  }
+  return bx_check_carrier(ctx, batten_solid_carrier(solid));
 }
 
 batten_status bx_check_carrier(batten_context *ctx, const batten_carrier *carrier) {
@@ -74,7 +78,7 @@ batten_status bx_check_carrier(batten_context *ctx, const batten_carrier *carrie
                        batten_carrier_kind_name(parts.kind));
   batten_status st = BATTEN_OK;
   for (int i = 0; st == BATTEN_OK && i < 2 && parts.children[i]; i++) st = bx_check_carrier(ctx, parts.children[i]);
-  if (st == BATTEN_OK && parts.solid) st = check_solid(ctx, parts.solid);
+  if (st == BATTEN_OK && parts.solid) st = bx_check_solid(ctx, parts.solid);
   return st;
 }
 
@@ -190,7 +194,7 @@ static batten_status check_path(batten_context *ctx, const char *path, const voi
 batten_status batten_save_solid(batten_context *ctx, const batten_solid *solid, const char *path) {
   bx_writer w;
   batten_status st = check_path(ctx, path, solid, "solid");
-  if (st == BATTEN_OK) st = check_solid(ctx, solid);
+  if (st == BATTEN_OK) st = bx_check_solid(ctx, solid);
   if (st == BATTEN_OK) st = bx_create(&w, ctx, path);
   if (st != BATTEN_OK) return st;
   bx_put_text(&w, "{\"batten\": \"solid\", \"version\": 1,\n");

@@ -304,10 +304,12 @@ BATTEN_API batten_status batten_write_sections(batten_context *ctx, size_t count
                                                const char *path);
 
 /* Trees of the algebra: {"batten": "frep", "version": 1, "nodes": {NAME: NODE, ...}, "root": NODE}; NODE is the name
- * of one of `nodes` or an object {"node": KIND, ...} with the arguments of KIND's constructor in <batten/frep.h>; see
- * docs/files.md. Solids as leaves are inline or {"node": "solid", "file": "heart.json"}, beside the scene. Nodes that
- * stand in several places are saved once. Loading names the place: "scene.json: root.b.radius: ...", cycles and
- * unknown names among them (FORMAT). */
+ * of one of `nodes` or an object {"node": KIND, ...} with the arguments of KIND's constructor in <batten/frep.h>, the
+ * nodes that it takes as "a" and "b"; see docs/files.md. Solids as leaves are inline or {"node": "solid", "file":
+ * "heart.json"}, beside the scene. Saving: nodes that stand in several places are saved once, callbacks are INVALID.
+ * Loading (.json, also .gz) names the place: "scene.json: root.b.radius: ..."; cycles, names of no node, arguments
+ * that a node does not take are FORMAT; nodes that nothing is made of are checked as well. Fails: IO, FORMAT, INVALID
+ * (unknown extension), NOMEM, TOO_LARGE, CANCELLED, and as constructors of nodes do; *out untouched then. */
 BATTEN_API batten_status batten_save_frep(batten_context *ctx, const batten_frep *tree, const char *path);
 BATTEN_API batten_status batten_load_frep(batten_context *ctx, const char *path, batten_frep **out);
 
@@ -365,8 +367,10 @@ typedef enum batten_file_kind {
   BATTEN_FILE_QP,
   BATTEN_FILE_NETWORK,
   BATTEN_FILE_SURFACE,
-  BATTEN_FILE_CURVES, /* one or several */
-  BATTEN_FILE_DOCUMENT /* another batten JSON document */
+  BATTEN_FILE_CURVES,   /* one or several */
+  BATTEN_FILE_DOCUMENT, /* another batten JSON document */
+  BATTEN_FILE_SECTIONS, /* of solids */
+  BATTEN_FILE_FREP      /* a tree of the algebra of solids */
 } batten_file_kind;
 BATTEN_API batten_status batten_file_identify(batten_context *ctx, const char *path, batten_file_kind *out);
 
