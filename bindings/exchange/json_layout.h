@@ -18,7 +18,7 @@ typedef enum bx_node_shape {
   BX_NODE_BELOW,   /* number; left out: -infinity */
   BX_NODE_ABOVE,   /* number; left out: infinity */
   BX_NODE_PATH,    /* [count][3] */
-  BX_NODE_UP,      /* [3]; may be left out */
+  BX_NODE_UP,      /* [3]; left out: zeros, which the kernel takes as any */
   BX_NODE_PLACES,  /* [count][n] */
   BX_NODE_CONTOURS /* [contours][points][2] */
 } bx_node_shape;

@@ -116,11 +116,12 @@ static size_t numbers_of(const bx_node_layout *layout, const batten_frep_parts *
     case BX_NODE_MATRIX:
       return (size_t)n * n;
     case BX_NODE_SPACE:
+    case BX_NODE_UP:
       return 3;
     case BX_NODE_AXES:
       return 6;
-    case BX_NODE_PATH: /* before two flags and, or not, a direction */
-      return (left - 2) / 3 * 3;
+    case BX_NODE_PATH: /* before two flags and a direction */
+      return left - 5;
     case BX_NODE_PLACES: /* from and to */
       return p->number_count / 2;
     case BX_NODE_CONTOURS:
@@ -138,6 +139,7 @@ static void put_member(bx_writer *w, const bx_node_layout *layout, const batten_
   *at += count;
   if (shape == BX_NODE_BELOW && !isfinite(*v)) return;
   if (shape == BX_NODE_ABOVE && !isfinite(*v)) return;
+  if (shape == BX_NODE_UP && v[0] == 0 && v[1] == 0 && v[2] == 0) return;
   bx_print(w, ", \"%s\": ", layout->members[member].name);
   switch (shape) {
     case BX_NODE_FLAG:

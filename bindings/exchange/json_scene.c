@@ -186,8 +186,8 @@ static batten_status get_member(bx_json *j, const json_t *object, const bx_node_
     case BX_NODE_SPACE:
       return get_some(j, object, key, 3, l);
     case BX_NODE_UP:
-      return given ? get_some(j, object, key, 3, l) : BATTEN_OK;
     case BX_NODE_SHIFT:
+      if (layout->members[i].shape == BX_NODE_UP) n = 3;
       if (given) return get_some(j, object, key, n, l);
       st = room_for(l, n, &to);
       for (unsigned k = 0; st == BATTEN_OK && k < n; k++) to[k] = 0;

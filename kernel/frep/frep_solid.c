@@ -68,14 +68,43 @@ static batten_status check_box(batten_context *ctx, const batten_frep *a, const 
   return BATTEN_OK;
 }
 
-batten_status batten_frep_to_solid(batten_context *ctx, batten_frep *a, const double *lower, const double *upper,
-                                   double cell, batten_solid **out) {
+static batten_status check_tree(batten_context *ctx, const batten_frep *a, const void *out) {
   batten_status st = out ? BATTEN_OK : batten_fail(ctx, BATTEN_E_INVALID, "out: NULL; give the place for the solid");
   if (st >= 0) st = frep_check_node(ctx, "a", a, 0);
-  if (st >= 0) st = check_box(ctx, a, lower, upper, cell);
   if (st >= 0 && a->below > CARRIER_DEPTH)
     st = batten_fail(ctx, BATTEN_E_TOO_LARGE, "a: solids nested %u levels deep, %d are allowed", a->below,
                      CARRIER_DEPTH);
+  return st;
+}
+
+static batten_status make_solid(batten_context *ctx, batten_frep *a, const double *lower, const double *upper,
+                                size_t count, const double *points, batten_solid **out) {
+  batten_frep *state = batten_frep_retain(a);
+  batten_status st = batten_solid_make(ctx, &tree_form, state, a->n, a->below, lower, upper, count, points, out);
+  if (st < 0) batten_frep_free(state);
+  return st;
+}
+
+batten_status batten_frep_solid_create(batten_context *ctx, batten_frep *a, const double *lower, const double *upper,
+                                       size_t count, const double *points, batten_solid **out) {
+  batten_status st = check_tree(ctx, a, out);
+  if (st >= 0 && (!lower || !upper))
+    st = batten_fail(ctx, BATTEN_E_INVALID, "%s: NULL; give a corner of the box", lower ? "upper" : "lower");
+  if (st >= 0) st = check_box(ctx, a, lower, upper, 0);
+  if (st >= 0 && (count == 0 || !points))
+    st = batten_fail(ctx, BATTEN_E_INVALID, "%s; give points on the surface, one or more",
+                     count ? "points: NULL" : "count: 0");
+  size_t numbers;
+  if (st >= 0 && !batten_mul(count, a->n, &numbers))
+    st = batten_fail(ctx, BATTEN_E_TOO_LARGE, "count: %zu; beyond the address space", count);
+  if (st >= 0) st = frep_check_numbers(ctx, "points", numbers, points);
+  return st < 0 ? st : make_solid(ctx, a, lower, upper, count, points, out);
+}
+
+batten_status batten_frep_to_solid(batten_context *ctx, batten_frep *a, const double *lower, const double *upper,
+                                   double cell, batten_solid **out) {
+  batten_status st = check_tree(ctx, a, out);
+  if (st >= 0) st = check_box(ctx, a, lower, upper, cell);
   if (st < 0) return st;
   double low[3], high[3], diagonal = 0, *seeds = NULL;
   size_t count = 0;
@@ -90,11 +119,7 @@ batten_status batten_frep_to_solid(batten_context *ctx, batten_frep *a, const do
   batten_field field = batten_frep_field(a);
   st = batten_find_seeds(ctx, &field, low, high, cell, &count, &seeds);
   if (st >= 0) st = project(ctx, a, count, cell, seeds);
-  if (st >= 0) {
-    batten_frep *state = batten_frep_retain(a);
-    st = batten_solid_make(ctx, &tree_form, state, a->n, a->below, low, high, count, seeds, out);
-    if (st < 0) batten_frep_free(state);
-  }
+  if (st >= 0) st = make_solid(ctx, a, low, high, count, seeds, out);
   batten_free(ctx, seeds);
   return st;
 }
