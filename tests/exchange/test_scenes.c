@@ -257,6 +257,7 @@ static batten_solid *make_stack(batten_context *ctx, double turn, batten_stack_o
 
 static void test_solids(batten_context *ctx, scratch *s) {
   static const double omega[LEVELS][3] = {{0.1, 0, 0}, {0.1, 0, 0}, {0.1, 0, 0}, {0.1, 0, 0}};
+  static const double lower[3] = {-3, -3, -3}, upper[3] = {3, 3, 3};
   batten_stack_options o = batten_stack_options_default();
   batten_solid *parallel = make_stack(ctx, 0, &o);
   o.between = BATTEN_BETWEEN_RATIONAL;
@@ -278,7 +279,7 @@ static void test_solids(batten_context *ctx, scratch *s) {
     T_OK(batten_frep_solid(ctx, parallel, &leaf), ctx);
     T_OK(load_root(ctx, leaves, roots[6], &leaf2), ctx);
     T_OK(batten_frep_combine(ctx, BATTEN_FREP_UNION, leaf, leaf2, 0, &both), ctx);
-    T_OK(batten_frep_to_solid(ctx, both, NULL, NULL, 0, &tree), ctx);
+    T_OK(batten_frep_to_solid(ctx, both, lower, upper, 0.3, &tree), ctx);
     if (tree) check_solid(ctx, s, "a tree with a stack in it", tree);
     if (tree) T_OK(batten_carrier_solid(ctx, tree, &carrier), ctx);
     if (carrier) {
