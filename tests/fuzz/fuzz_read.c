@@ -202,6 +202,40 @@ static const char *read_qp(bx_reader *r, bx_format format) {
   return wrong;
 }
 
+static const char *read_sections(bx_reader *r, bx_format format, int points) {
+  batten_section_set set = {0};
+  const char *wrong = NULL;
+  batten_read_sections_options o = batten_read_sections_options_default();
+  o.gap = 1;
+  o.points = points;
+  batten_status st = bx_read_sections_from(r, format, &o, &set);
+  if (st != BATTEN_OK) return set.sections ? "a result in spite of a failure" : check_failure(r->ctx, st);
+  if (set.count == 0) wrong = "no sections";
+  for (size_t i = 0; i < set.count; i++) {
+    const batten_section *s = &set.sections[i];
+    for (size_t k = 0; k < s->contour_count; k++)
+      if (s->starts[k] >= s->starts[k + 1]) wrong = "a contour without points";
+    for (size_t k = 0; k < 2 * s->starts[s->contour_count]; k++)
+      if (!isfinite(s->points[k])) wrong = "a point that is not finite";
+    for (int k = 0; k < 3; k++)
+      if (!isfinite(s->origin[k]) || !isfinite(s->rotation[k][0])) wrong = "a frame that is not finite";
+  }
+  batten_section_set_free(r->ctx, &set);
+  return wrong;
+}
+
+/* Trees may fail as their nodes' constructors do. */
+static const char *load_frep(bx_reader *r) {
+  batten_frep *tree = NULL;
+  batten_status st = bx_load_frep_from(r, &tree);
+  if (st != BATTEN_OK)
+    return tree ? "a result in spite of a failure" : st == BATTEN_E_SINGULAR ? NULL : check_failure(r->ctx, st);
+  double x[3] = {0.25, 0.5, 0.75}, f, g[3];
+  st = batten_frep_evaluate(r->ctx, tree, 1, x, &f, g);
+  batten_frep_free(tree);
+  return st < 0 ? "a tree that cannot be evaluated" : NULL;
+}
+
 /* The readers of a format, by number; false when there are no more. */
 static bool read_once(bx_reader *r, bx_format format, unsigned which, const char **wrong) {
   *wrong = NULL;
@@ -211,17 +245,21 @@ static bool read_once(bx_reader *r, bx_format format, unsigned which, const char
     return true;
   }
   if (format == BX_JSON) {
-    if (which > 6) return false;
+    if (which > 8) return false;
     *wrong = which == 0   ? load_solid(r)
              : which == 1 ? load_carrier(r)
              : which == 2 ? read_qp(r, format)
              : which == 3 ? load_qp_solution(r)
              : which == 4 ? read_network(r)
              : which == 5 ? read_surface(r)
-                          : read_curves(r);
+             : which == 6 ? read_curves(r)
+             : which == 7 ? read_sections(r, format, 0)
+                          : load_frep(r);
     return true;
   }
-  if (which == 3)
+  if (which > 3 && which < 6 && format == BX_TEXT)
+    *wrong = read_sections(r, format, which == 5);
+  else if (which == 3)
     *wrong = format == BX_TEXT ? read_contours(r) : read_mesh(r, format);
   else if (which < 3)
     *wrong = read_points(r, format, which ? which + 1 : 0);
