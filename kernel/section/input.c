@@ -12,8 +12,8 @@
 #include "basis/neighbours.h"
 #include "basis/quantile.h"
 #include "mesh/vec.h"
+#include "section/path.h"
 #include "section/rotations.h"
-#include "section/section_inner.h"
 
 /* Above it the squares of distances overflow. */
 static const double COORDINATE_MAX = 1e150;
@@ -261,9 +261,17 @@ static void settle_size(taking *t) {
   t->size = vec_distance(lower, upper);
 }
 
+/* Do frames turn by a given velocity? */
+static bool frames_turn(const stack *s) {
+  if (s->rotation != BATTEN_ROTATION_VELOCITY || s->count < 2) return false;
+  for (size_t i = 0; i < 3 * s->count; i++)
+    if (s->angular_velocity[i] != 0) return true;
+  return false;
+}
+
 /* Of parallel sections all get the frame of the first, so that they are shifted and nothing else. */
 static void settle_parallel(stack *s) {
-  s->parallel = true;
+  s->parallel = !frames_turn(s);
   for (size_t i = 1; i < s->count; i++)
     for (int k = 0; k < 3; k++)
       if (!(vec_distance(s->sections[i].rotation[k], s->sections[0].rotation[k]) <= PARALLEL_TOLERANCE))
@@ -366,6 +374,19 @@ done:
   return st;
 }
 
+/* Sections whose frames follow from the velocity stand in these; the first one's is where they begin. */
+static batten_status take_frames(batten_context *ctx, stack *s) {
+  stack_path *path = NULL;
+  const stack_plane *planes;
+  batten_status st = stack_path_make(ctx, s, &path);
+  if (st < 0) return st;
+  stack_path_planes(path, &planes);
+  for (size_t i = 1; i < s->count; i++)
+    memcpy(s->sections[i].rotation, planes[i].rotation, sizeof planes[i].rotation);
+  stack_path_free(path);
+  return BATTEN_OK;
+}
+
 static batten_status take_options(taking *t) {
   const batten_stack_options *o = t->opt;
   stack *s = t->s;
@@ -413,6 +434,9 @@ batten_status stack_take_sections(batten_context *ctx, size_t count, const batte
   if (st < 0) return st;
   settle_parallel(out);
   settle_size(&t);
-  if (opt->route != BATTEN_ROUTE_SPACE) st = check_order(&t);
-  return st < 0 ? st : settle_gaps(&t);
+  bool integrated = opt->rotation == BATTEN_ROTATION_VELOCITY && !out->parallel;
+  if (integrated) st = settle_gaps(&t);
+  if (st >= 0 && integrated) st = take_frames(ctx, out);
+  if (st >= 0 && opt->route != BATTEN_ROUTE_SPACE) st = check_order(&t);
+  return st < 0 || integrated ? st : settle_gaps(&t);
 }

@@ -67,7 +67,7 @@ typedef enum batten_stack_rotation {
   BATTEN_ROTATION_LOGARITHM,     /* the paper's exp((1 - t) ln M_i + t ln M_(i+1)): not the same in a turned frame of
                                     reference; fails where a section is half a turn from the axes of that frame */
   BATTEN_ROTATION_VELOCITY       /* integrated from the angular velocity, from rotation of the first section on:
-                                    sections stand in these frames, their own rotations only serve checks */
+                                    sections stand in these frames, rotations of the others do not count */
 } batten_stack_rotation;
 
 typedef enum batten_stack_path {
