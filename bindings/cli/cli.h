@@ -16,6 +16,8 @@ enum { CLI_DONE = 0, CLI_FAILED = 1, CLI_USAGE = 2, CLI_INTERRUPTED = 130 };
 
 /* ---- subcommands: argv[0] is the subcommand's name ---- */
 int cli_solid(int argc, char **argv);
+int cli_stack(int argc, char **argv);
+int cli_frep(int argc, char **argv);
 int cli_qp(int argc, char **argv);
 int cli_network(int argc, char **argv);
 int cli_convex(int argc, char **argv);

@@ -14,6 +14,8 @@ typedef struct command {
 
 static const command commands[] = {
     {"solid", cli_solid, "solid from scattered surface points: mesh, picture, report"},
+    {"stack", cli_stack, "solid from plane sections, parallel or not: mesh, picture, report"},
+    {"frep", cli_frep, "algebra of solids: unions, blends, offsets, sweeps, deformations of a scene"},
     {"convex", cli_convex, "convex surface or function from scattered points: STEP, mesh, picture, report"},
     {"curve", cli_curve, "planar curves of wanted inflections through points: STEP, SVG, picture, report"},
     {"loft", cli_loft, "surface through contours whose sections keep their shape: STEP, mesh, picture, report"},

@@ -126,7 +126,8 @@ is s.json mesh_manifold True
 is s.json sign_check clean
 is s.json status ok
 is s.json outline_loops None
-for key in $(sed -n '/^## Common/,/^## batten inspect/s/^| \(`[^|]*`\) |.*/\1/p' "$root/docs/report.md" | tr -d '`'); do
+for key in $(sed -n -e '/^## Common/,/^## batten stack/s/^| \(`[^|]*`\) |.*/\1/p' \
+  -e '/^## Surfaces of solids/,/^## batten inspect/s/^| \(`[^|]*`\) |.*/\1/p' "$root/docs/report.md" | tr -d '`'); do
   echo "$key"
 done | sort >documented
 python3 -c 'import json; print("\n".join(sorted(json.load(open("s.json")))))' >reported
