@@ -71,7 +71,7 @@ void body_note(body *b, batten_status st) {
   if (b->status == BATTEN_OK) b->status = st;
 }
 
-/* A tree's box is tight: the surface is looked for in a little more. */
+/* A tree's box is tight; a margin of a quarter, as around points, would only be searched in vain. */
 static void widen_box(body *b, unsigned n) {
   batten_polygonize_options *o = &b->request->surface;
   if (b->request->box) return;
@@ -87,13 +87,10 @@ batten_status body_mesh(body *b, double cell) {
   batten_context *ctx = b->run->ctx;
   batten_field field = batten_solid_field(b->solid);
   batten_polygonize_options *o = &b->request->surface;
-  size_t count = 0;
-  const double *seeds = NULL;
+  size_t count;
+  const double *seeds = batten_solid_points(b->solid, &count);
   if (o->cell == 0) o->cell = cell;
-  if (batten_solid_kind_of(b->solid) == BATTEN_SOLID_TREE)
-    widen_box(b, field.dimension);
-  else
-    seeds = batten_solid_points(b->solid, &count);
+  if (batten_solid_kind_of(b->solid) == BATTEN_SOLID_TREE) widen_box(b, field.dimension);
   batten_status st = field.dimension == 2
                          ? batten_trace_outline(ctx, &field, count, seeds, o, &b->outline, &b->surface)
                          : batten_polygonize(ctx, &field, count, seeds, o, &b->mesh, &b->surface);

@@ -58,8 +58,8 @@ typedef struct body {
 int body_check(body *b, unsigned dimension);
 /* Tells a warning and keeps the first. */
 void body_note(body *b, batten_status status);
-/* The surface of b->solid, its measures, gradient and curvatures of f at its vertices. Trees are searched in their
- * box, others from their points. cell: where the command line does not say. */
+/* The surface of b->solid, tracked from its points; its measures, gradient and curvatures of f at its vertices. cell:
+ * where the command line does not say. */
 batten_status body_mesh(body *b, double cell);
 /* All outputs but the report to their staged names. */
 batten_status body_write(body *b);

@@ -105,19 +105,22 @@ static batten_status count_nodes(frep_work *w) {
   return BATTEN_OK;
 }
 
-static double default_cell(const frep_work *w) {
-  double lower[3] = {0}, upper[3] = {0};
-  batten_solid_box(w->body.solid, lower, upper);
-  double diagonal = hypot(hypot(upper[0] - lower[0], upper[1] - lower[1]), upper[2] - lower[2]);
-  return diagonal / (batten_frep_dimension(w->tree) == 2 ? 500 : 150);
-}
-
+/* The solid, with points on each piece of its surface that cells show: fine enough for the mesh to miss none. */
 static batten_status find_solid(frep_work *w) {
-  const batten_polygonize_options *o = &w->request->body.surface;
-  bool boxed = w->request->body.box != NULL;
-  double start = batten_now();
-  batten_status st =
-      batten_frep_to_solid(w->run.ctx, w->tree, boxed ? o->lower : NULL, boxed ? o->upper : NULL, 0, &w->body.solid);
+  batten_polygonize_options *o = &w->request->body.surface;
+  double start = batten_now(), lower[3] = {0}, upper[3] = {0};
+  unsigned n = batten_frep_dimension(w->tree);
+  batten_status st = BATTEN_OK;
+  if (w->request->body.box) {
+    memcpy(lower, o->lower, sizeof lower);
+    memcpy(upper, o->upper, sizeof upper);
+  } else
+    st = batten_frep_box(w->run.ctx, w->tree, lower, upper);
+  if (o->cell == 0) {
+    for (unsigned k = 0; k < n; k++) o->cell = hypot(o->cell, upper[k] - lower[k]);
+    o->cell /= n == 2 ? 500 : 150;
+  }
+  if (st >= 0) st = batten_frep_to_solid(w->run.ctx, w->tree, lower, upper, o->cell, &w->body.solid);
   w->time_search_s = batten_now() - start;
   return st;
 }
@@ -179,7 +182,7 @@ static int work(cli_request *q) {
     if (status != CLI_DONE) goto done;
     st = find_solid(&w);
   }
-  if (st >= 0) st = body_mesh(&w.body, default_cell(&w));
+  if (st >= 0) st = body_mesh(&w.body, 0);
   status = st < 0 ? cli_run_failed(&w.run, st) : write_outputs(&w);
   if (status == CLI_DONE && !q->quiet && !cli_outputs_to_stdout(&q->outputs)) print_summary(&w);
 done:
