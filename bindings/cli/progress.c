@@ -114,9 +114,10 @@ static size_t named_input(const char *own, const char *input) {
 
 /* Whether a text is about what the input holds. */
 static bool about_input(const char *own) {
-  static const char *const words[] = {
-      "points",         "matrix",      "seeds",         "problem", "edge",       "vert",    "triangle", "mesh",
-      "opt.parameters", "opt.weights", "opt.triangles", "count",   "parameters", "contour", "planes",   "slice"};
+  static const char *const words[] = {"points",        "matrix",   "seeds",      "problem",        "edge",
+                                      "vert",          "triangle", "mesh",       "opt.parameters", "opt.weights",
+                                      "opt.triangles", "count",    "parameters", "contour",        "planes",
+                                      "slice",         "sections"};
   for (size_t i = 0; i < sizeof words / sizeof *words; i++)
     if (strncmp(own, words[i], strlen(words[i])) == 0) return true;
   return false;

@@ -54,7 +54,7 @@ typedef enum batten_stack_end {
                           is that of the sum of slices */
   BATTEN_END_PLANE,    /* flat at the plane of the end section */
   BATTEN_END_ROUNDED,  /* F_end - rho (s / H)^2, rho the largest F_end of each component: closes at H = end_height
-                          gaps,  default 1, where it adds 8/15 of H times a disc's area */
+                          gaps, default 1; adds from 8/15 (F a cone) to 2/3 (a paraboloid) of H times a disc's area */
   BATTEN_END_OPEN      /* the end section goes on for ever; the solid's box ends at the plane, surfaces are cut there
                           (parallel planes); a mesh has boundary loops */
 } batten_stack_end;
