@@ -117,7 +117,7 @@ static bool about_input(const char *own) {
   static const char *const words[] = {"points",        "matrix",   "seeds",      "problem",        "edge",
                                       "vert",          "triangle", "mesh",       "opt.parameters", "opt.weights",
                                       "opt.triangles", "count",    "parameters", "contour",        "planes",
-                                      "slice",         "sections"};
+                                      "slice",         "sections", "a: "};
   for (size_t i = 0; i < sizeof words / sizeof *words; i++)
     if (strncmp(own, words[i], strlen(words[i])) == 0) return true;
   return false;
@@ -127,6 +127,7 @@ static bool about_input(const char *own) {
 static void use_words(char *text, size_t size) {
   static const char *const words[][2] = {
       {"opt.lower and opt.upper", "--box"},
+      {"give lower and upper", "give --box"},
       {"opt.evaluations_max", "evaluations"},
       {"opt.normals", "normals in the file"},
       {"opt.spline.smoothing", "--smoothing"},

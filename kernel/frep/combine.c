@@ -418,11 +418,23 @@ static batten_status blend_slopes(const batten_frep *a, batten_context *ctx, siz
   return st;
 }
 
-/* Material that is taken away leaves the operation's box. */
+/* Material that is taken away leaves the operation's box. What is added has f + g +- sqrt(f^2 + g^2) >= -a0: of a
+ * union
+ * -(2 - sqrt 2) times the smaller of |f| and |g| is at least that, so that one of both is above -1.71 a0; of an
+ * intersection both are. A distance is so only as far out; of others that is taken to be 4 times as far, as for
+ * offsets. */
 static bool blend_box(const batten_frep *a, double *lower, double *upper) {
-  if (a->numbers[0] > 0) return false;
-  if (turns_second(a)) return first_box(a, lower, upper);
-  return root_sign(a) > 0 ? hull_box(a, lower, upper) : meet_box(a, lower, upper);
+  bool second = !turns_second(a), known = !second            ? first_box(a, lower, upper)
+                                          : root_sign(a) > 0 ? hull_box(a, lower, upper)
+                                                             : meet_box(a, lower, upper);
+  if (!known || a->numbers[0] <= 0) return known;
+  bool distance = a->children[0]->distance && (!second || a->children[1]->distance);
+  double reach = 1.71 * a->numbers[0] * (distance ? 1 : 4);
+  for (unsigned k = 0; k < a->n; k++) {
+    lower[k] -= reach;
+    upper[k] += reach;
+  }
+  return true;
 }
 
 batten_status batten_frep_blend(batten_context *ctx, batten_frep_operation operation, batten_frep *a, batten_frep *b,

@@ -37,7 +37,7 @@ scene() { printf '{"batten": "frep", "version": 1, %s}' "$1"; }
 ball='{"node": "ball", "center": [0, 0, 0], "radius": 1}'
 ls -A >before
 run 2 "no scene" frep
-run 2 "unknown option '--cel'; did you mean '--cell'?" frep scene.json --cel 1
+run 2 "unknown option '--cells'; did you mean '--cell'?" frep scene.json --cells 1
 run 2 "x.step: unknown extension for -o" frep scene.json -o x.step
 run 2 "--box: '1,2' is not the 6 numbers of two corners" frep scene.json --box 1,2
 run 1 "none.json" frep none.json
@@ -81,7 +81,7 @@ run 0 "" frep shell.json --quiet --report r.json
 near r.json volume 2.521651 0.01
 is r.json mesh_components 2
 scene "\"root\": {\"node\": \"negation\", \"a\": $ball}" >outside.json
-run 0 "surface reaches its box" frep outside.json --box -1,-1.5,-1.5,1.5,1.5,1.5 --quiet --report r.json
+run 0 "surface reaches its box" frep outside.json --box=-0.5,-1.5,-1.5,1.5,1.5,1.5 --quiet --report r.json
 scene '"root": {"node": "sweep", "smooth": false, "closed": false, "path": [[0, 0, 0], [4, 0, 0]],
   "a": {"node": "ball", "center": [0, 0, 0], "radius": 1}}' >capsule.json
 run 0 "" frep capsule.json --quiet --report r.json

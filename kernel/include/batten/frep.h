@@ -163,7 +163,7 @@ BATTEN_API batten_status batten_frep_bounds(batten_context *ctx, const batten_fr
 BATTEN_API batten_field batten_frep_field(const batten_frep *a); /* order 1, with bounds; valid as long as the node */
 /* A finite box [n] each that holds the solid f >= 0, wider than it by 0.4 to about 1 % of its largest extent on each
  * side (more where bounds are wide), found by bounds within what the structure tells: for reconstructed solids the
- * box of the data and half its diagonal, for offsets and shells of what is no distance 4 times as much as for a
+ * box of the data and half its diagonal, for offsets, shells and blends of what is no distance 4 times as much as for a
  * distance. Progress phase "box". NOT_FOUND: no end was found (a half-space, a negation), or the solid is empty: the
  * text says which. */
 BATTEN_API batten_status batten_frep_box(batten_context *ctx, const batten_frep *a, double *lower, double *upper);
