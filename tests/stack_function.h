@@ -28,7 +28,7 @@ static inline double function_scale(void) { return 8.4 / (69 - 14); }
 /* F_i(y, z) = U(y) - z as a host's field. */
 static inline batten_status function_slice(const void *user, batten_context *ctx, size_t count, const double *points,
                                            double *values, double *gradients, double *hessians) {
-  double *y = malloc((3 * count + 1) * sizeof *y);
+  double *y = calloc(3 * count + 1, sizeof *y);
   (void)hessians;
   if (!y) return batten_fail(ctx, BATTEN_E_NOMEM, "out of memory");
   for (size_t i = 0; i < count; i++) y[i] = points[2 * i];
