@@ -118,14 +118,14 @@ static batten_status bounds_block(bounds_batch *b, batten_context *ctx, size_t c
   return BATTEN_OK;
 }
 
-/* Links reach no higher than this: the upper ends of ranges [count] rise where boxes lie between their sections. */
+/* Ranges [count] rise where boxes lie between sections with links. */
 static batten_status join_links(const stack *s, batten_context *ctx, size_t count, const double *boxes,
                                 double *ranges) {
   size_t n = count < BATCH ? count : BATCH;
   batten_status st = BATTEN_E_NOMEM;
-  double *parts = batten_alloc_array(ctx, n, 6 * sizeof *parts), *upper = batten_alloc_array(ctx, n, sizeof *upper);
+  double *parts = batten_alloc_array(ctx, n, 6 * sizeof *parts), *own = batten_alloc_array(ctx, n, 2 * sizeof *own);
   uint32_t *index = batten_alloc_array(ctx, n, sizeof *index);
-  if (!parts || !upper || !index) goto done;
+  if (!parts || !own || !index) goto done;
   st = BATTEN_OK;
   for (size_t k = 0; k < s->link_count && st >= 0; k++) {
     size_t at = s->links[k].section, asked = 0;
@@ -134,20 +134,21 @@ static batten_status join_links(const stack *s, batten_context *ctx, size_t coun
     for (size_t i = 0; i < count && st >= 0; i++) {
       const double *box = boxes + 6 * i;
       if (box[2] < t1 && box[5] > t0) {
-        double u0 = fmax(0, (box[2] - t0) / (t1 - t0)), u1 = fmin(1, (box[5] - t0) / (t1 - t0));
+        double u0 = (box[2] - t0) / (t1 - t0), u1 = (box[5] - t0) / (t1 - t0);
+        memcpy(own + 2 * asked, ranges + 2 * i, 2 * sizeof *own);
         memcpy(parts + 6 * asked, (double[6]){box[0], box[1], u0, box[3], box[4], u1}, 6 * sizeof *parts);
         index[asked++] = (uint32_t)i;
       }
       if (asked == 0 || (asked < n && i + 1 < count)) continue;
-      st = stack_link_bounds(s, ctx, at, asked, parts, upper);
+      st = stack_link_bounds(s, ctx, at, asked, parts, own);
       for (size_t j = 0; j < asked && st >= 0; j++)
-        ranges[2 * index[j] + 1] = fmax(ranges[2 * index[j] + 1], upper[j]);
+        memcpy(ranges + 2 * (size_t)index[j], own + 2 * j, 2 * sizeof *own);
       asked = 0;
     }
   }
 done:
   batten_free(ctx, parts);
-  batten_free(ctx, upper);
+  batten_free(ctx, own);
   batten_free(ctx, index);
   return st;
 }

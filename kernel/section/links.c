@@ -10,6 +10,7 @@
  * lies below the section's functions there, and the largest of F and all links leaves both sections as they are:
  * places on the planes are not even asked. L <= (1 - u) F_a + u F_b, which costs no distances, tells most places
  * where no link shows. */
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -82,24 +83,30 @@ static void add_slope(const double *x, const double *nearest, double d, double f
   for (int k = 0; k < 2 && d > 0; k++) gradient[k] += factor * (x[k] - nearest[k]) / d;
 }
 
-/* min(f, (d_a - d_other) / 2) at place; slope as well, unless NULL. A point of the area belongs to the component
- * whose outline is the nearer. */
-static double localized(const link_end *e, const double *place, double f, double *slope) {
-  if (e->alone) return f;
-  const double x[2] = {place[0] - e->shift[0], place[1] - e->shift[1]};
+/* (d_a - d_other) / 2 at x, a place of the section's own; slope as well, unless NULL. A point of the area belongs to
+ * the component whose outline is the nearer. */
+static double parting(const link_end *e, const double x[2], double *slope) {
   double own_place[2], other_place[2];
   double own = polygon_nearest_to(e->loops, e->own, x, own_place);
   double other = polygon_nearest_to(e->loops, e->others, x, other_place);
   bool inside = polygon_inside(e->loops, x);
   double own_sign = inside && own <= other ? 1 : -1, other_sign = inside && own > other ? 1 : -1;
-  double parting = (own_sign * own - other_sign * other) / 2;
-  if (f <= parting) return f;
   if (slope) {
     slope[0] = slope[1] = 0;
     add_slope(x, own_place, own, own_sign / 2, slope);
     add_slope(x, other_place, other, -other_sign / 2, slope);
   }
-  return parting;
+  return (own_sign * own - other_sign * other) / 2;
+}
+
+/* min(f, (d_a - d_other) / 2) at place; slope as well, unless NULL. */
+static double localized(const link_end *e, const double *place, double f, double *slope) {
+  if (e->alone) return f;
+  const double x[2] = {place[0] - e->shift[0], place[1] - e->shift[1]};
+  double parted[2], value = parting(e, x, slope ? parted : NULL);
+  if (f <= value) return f;
+  if (slope) memcpy(slope, parted, sizeof parted);
+  return value;
 }
 
 static void link_task(void *arg, size_t task) {
@@ -167,40 +174,65 @@ static void sheared_boxes(const link_end *e, const double *way, bool upper, size
 }
 
 /* As stack_shape, which increases. */
-static double shape_above(const stack_section *section, double f) {
-  interval value = interval_scale(interval_of(f), section->scale);
-  if (section->saturation < INFINITY) {
-    value = interval_div(value, interval_of(section->saturation));
-    value = interval_scale(interval_tanh(value), section->saturation);
+static interval shape_bounds(const stack_section *section, interval f) {
+  f = interval_scale(f, section->scale);
+  if (section->saturation == INFINITY) return f;
+  return interval_scale(interval_tanh(interval_div(f, interval_of(section->saturation))), section->saturation);
+}
+
+/* A over a box of the section's own, f: of F_a there. Distances change by no more than their place moves. */
+static interval localized_bounds(const link_end *e, const double *box, interval f) {
+  if (e->alone) return f;
+  double middle[2], half[2], size = 0;
+  for (int d = 0; d < 2; d++) {
+    middle[d] = box[d] / 2 + box[2 + d] / 2;
+    half[d] = fmax(box[2 + d] - middle[d], middle[d] - box[d]);
+    size += fabs(middle[d]) + half[d] + fabs(e->loops->lower[d]) + fabs(e->loops->upper[d]);
   }
-  return value.hi;
+  double reach = hypot(half[0], half[1]) * (1 + 4 * DBL_EPSILON) + 32 * DBL_EPSILON * size;
+  double value = parting(e, middle, NULL);
+  return interval_min(f, (interval){value - reach, value + reach});
 }
 
-/* (1 - u) a + u b, no less. */
-static double between_above(double a, double b, double u) {
-  interval part = interval_scale(interval_sub(interval_of(1), interval_of(u)), a);
-  return interval_add(part, interval_scale(interval_of(u), b)).hi;
+/* (1 - u) a + u b over u; for any a and b it is least and largest at ends of u. */
+static interval link_between(interval a, interval b, interval u) {
+  interval sum = {INFINITY, -INFINITY};
+  if (!(fabs(a.lo) < INFINITY && fabs(a.hi) < INFINITY && fabs(b.lo) < INFINITY && fabs(b.hi) < INFINITY))
+    return interval_hull(a, b);
+  for (int end = 0; end < 2; end++) {
+    interval here = interval_of(end ? u.hi : u.lo);
+    interval part = interval_mul(interval_sub(interval_of(1), here), a);
+    part = interval_add(part, interval_mul(here, b));
+    sum = end ? interval_hull(sum, part) : part;
+  }
+  return sum;
 }
 
-/* A lies below F_a, and so does the link below the blend of both; for any u that is largest at an end. */
+/* Distances are asked where the blend of F_a and F_b, which a link never exceeds, comes above what is there without
+ * it. On the planes and outside of them there is no link; on the planes it would add nothing, so that only what goes
+ * beyond them keeps its lower end. */
 static batten_status bound_link(const stack *s, batten_context *ctx, const batten_stack_link *link, size_t count,
-                                const double *boxes, double *own, double *ranges, double *upper) {
+                                const double *boxes, double *own, double *f, double *ranges) {
   link_end ends[2] = {{0}, {0}};
   double way[2];
   batten_status st = link_make(s, ctx, link, ends, way);
   for (size_t e = 0; st >= 0 && e < 2; e++) {
-    const stack_section *section = &s->sections[link->section + e];
-    sheared_boxes(&ends[e], way, e == 1, count, boxes, own);
-    st = batten_solid_bounds(ctx, section->function, count, own, ranges + 2 * e * count);
-    for (size_t i = 0; st >= 0 && i < count; i++)
-      ranges[2 * (e * count + i) + 1] = shape_above(section, ranges[2 * (e * count + i) + 1]);
+    sheared_boxes(&ends[e], way, e == 1, count, boxes, own + 4 * e * count);
+    st = batten_solid_bounds(ctx, s->sections[link->section + e].function, count, own + 4 * e * count,
+                             f + 2 * e * count);
   }
   for (size_t i = 0; st >= 0 && i < count; i++) {
-    double a = ranges[2 * i + 1], b = ranges[2 * (count + i) + 1];
-    interval u = {fmin(fmax(boxes[6 * i + 2], 0), 1), fmax(fmin(boxes[6 * i + 5], 1), 0)};
-    bool finite = fabs(a) < INFINITY && fabs(b) < INFINITY;
-    double here = finite ? fmax(between_above(a, b, u.lo), between_above(a, b, u.hi)) : fmax(a, b);
-    upper[i] = fmax(upper[i], here);
+    interval u = {fmin(fmax(boxes[6 * i + 2], 0), 1), fmax(fmin(boxes[6 * i + 5], 1), 0)}, part[2];
+    for (size_t e = 0; e < 2; e++) {
+      const double *range = f + 2 * (e * count + i);
+      part[e] = shape_bounds(&s->sections[link->section + e], (interval){range[0], range[1]});
+    }
+    if (link_between(part[0], part[1], u).hi <= ranges[2 * i]) continue;
+    for (size_t e = 0; e < 2; e++) part[e] = localized_bounds(&ends[e], own + 4 * (e * count + i), part[e]);
+    interval here = link_between(part[0], part[1], u);
+    bool within = boxes[6 * i + 2] >= 0 && boxes[6 * i + 5] <= 1;
+    if (within) ranges[2 * i] = fmax(ranges[2 * i], here.lo);
+    ranges[2 * i + 1] = fmax(ranges[2 * i + 1], here.hi);
   }
   for (int e = 0; e < 2; e++) end_free(ctx, &ends[e]);
   return st;
@@ -231,17 +263,16 @@ batten_status stack_link_evaluate(const stack *s, batten_context *ctx, size_t at
 }
 
 batten_status stack_link_bounds(const stack *s, batten_context *ctx, size_t at, size_t count, const double *boxes,
-                                double *upper) {
+                                double *ranges) {
   size_t range[2];
   links_of(s, at, range);
-  for (size_t i = 0; i < count; i++) upper[i] = -INFINITY;
   if (range[0] == range[1]) return BATTEN_OK;
-  double *own = batten_alloc_array(ctx, count, 4 * sizeof *own);
-  double *ranges = batten_alloc_array(ctx, count, 4 * sizeof *ranges);
-  batten_status st = own && ranges ? BATTEN_OK : BATTEN_E_NOMEM;
+  double *own = batten_alloc_array(ctx, count, 8 * sizeof *own);
+  double *f = batten_alloc_array(ctx, count, 4 * sizeof *f);
+  batten_status st = own && f ? BATTEN_OK : BATTEN_E_NOMEM;
   for (size_t k = range[0]; st >= 0 && k < range[1]; k++)
-    st = bound_link(s, ctx, &s->links[k], count, boxes, own, ranges, upper);
+    st = bound_link(s, ctx, &s->links[k], count, boxes, own, f, ranges);
   batten_free(ctx, own);
-  batten_free(ctx, ranges);
+  batten_free(ctx, f);
   return st;
 }

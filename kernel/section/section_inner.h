@@ -134,10 +134,10 @@ batten_status stack_find_components(batten_context *ctx, stack *s, bool link, st
  * F_at and F_next there. */
 batten_status stack_link_evaluate(const stack *s, batten_context *ctx, size_t at, size_t count, const double *places,
                                   const double *u, double *values, double *gradients);
-/* upper [count]: bounds of the links' values from above over boxes [count][2][3] (x, y, u); -INFINITY without links.
- */
+/* Bounds of it over boxes [count][2][3] (x, y, u; u may go beyond [0, 1], where there are no links): ranges [count][2]
+ * of the values without links become those with them. */
 batten_status stack_link_bounds(const stack *s, batten_context *ctx, size_t at, size_t count, const double *boxes,
-                                double *upper);
+                                double *ranges);
 /* Pairs of sections whose planes cross in a line of which a part lies in the convex hulls of both: notes CROSSING,
  * section before other, contour SIZE_MAX. */
 batten_status stack_find_crossings(batten_context *ctx, const stack *s, stack_notes *notes, size_t *crossings);
