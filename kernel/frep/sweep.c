@@ -25,14 +25,10 @@ static void velocity(const void *user, size_t piece, double u, double *dy) {
 static void image(const void *user, size_t piece, double from, double to, const interval *x, interval *y) {
   const sweep_path *path = user;
   const sweep_piece *p = path->piece + piece;
-  int first = from == 1 ? 3 : 0, last = to == 0 ? 0 : 3;
+  const double *end = from == 1 ? p->b[3] : to == 0 ? p->b[0] : NULL;
   for (unsigned k = 0; k < 3; k++) {
-    interval o = interval_of(p->b[first][k]);
-    double size = 0;
-    for (int j = 0; j < 4; j++) {
-      if (j >= first && j <= last) o = interval_hull(o, interval_of(p->b[j][k]));
-      size = fmax(size, fabs(p->b[j][k]));
-    }
+    interval o = end ? interval_of(end[k]) : (interval){p->low[k], p->high[k]};
+    double size = fmax(-p->low[k], p->high[k]);
     y[k] = interval_sub(x[k], interval_widen(o.lo - 4e-15 * size, o.hi + 4e-15 * size, 1));
   }
 }

@@ -169,6 +169,10 @@ static size_t splits_of(double b[4][3]) {
 static void measure_piece(sweep_piece *p) {
   static const double choose2[3] = {1, 2, 1}, choose3[4] = {1, 3, 3, 1}, choose5[6] = {1, 5, 10, 10, 5, 1};
   double d[3][3], least = INFINITY, along[3];
+  for (int k = 0; k < 3; k++) {
+    p->low[k] = fmin(fmin(p->b[0][k], p->b[1][k]), fmin(p->b[2][k], p->b[3][k]));
+    p->high[k] = fmax(fmax(p->b[0][k], p->b[1][k]), fmax(p->b[2][k], p->b[3][k]));
+  }
   legs(p->b, d);
   p->turn = turn_of(p->b);
   p->length = p->fast = p->bend = 0;
@@ -315,6 +319,52 @@ static batten_status set_nodes(batten_context *ctx, sweep_path *path, bool frame
   return BATTEN_OK;
 }
 
+/* ---- runs ------------------------------------------------------------------------------------------ */
+
+static void set_run(const sweep_path *path, size_t first, size_t last, sweep_run *run) {
+  const size_t middle = first + (last - first) / 2;
+  memcpy(run->middle, path->node[middle].o, sizeof run->middle);
+  memcpy(run->tangent, path->node[middle].tangent, sizeof run->tangent);
+  for (size_t i = first; i < last; i++) {
+    double apart[3];
+    for (int k = 0; k < 3; k++) apart[k] = path->node[i].tangent[k] - run->tangent[k];
+    run->spread = fmax(run->spread, norm(apart) + path->piece[i].turn);
+    for (int j = 0; j < 4; j++) {
+      for (int k = 0; k < 3; k++) apart[k] = path->piece[i].b[j][k] - run->middle[k];
+      run->radius = fmax(run->radius, norm(apart));
+    }
+  }
+}
+
+static batten_status set_runs(batten_context *ctx, sweep_path *path) {
+  size_t runs = (path->pieces + SWEEP_RUN - 1) / SWEEP_RUN;
+  path->run = batten_alloc_array(ctx, runs, sizeof *path->run);
+  if (!path->run) return BATTEN_E_NOMEM;
+  for (size_t i = 0; i < runs; i++) {
+    path->run[i] = (sweep_run){0};
+    size_t first = SWEEP_RUN * i, last = path->pieces - first < SWEEP_RUN ? path->pieces : first + SWEEP_RUN;
+    set_run(path, first, last, path->run + i);
+  }
+  return BATTEN_OK;
+}
+
+/* T . (x - o) for a unit tangent T at o within the run differs from that of its middle by at most spread |x - middle|
+ * + radius. */
+static bool is_far(const sweep_path *path, const sweep_run *run, const double *x, double half) {
+  double q[3], size = path->total + half;
+  for (int k = 0; k < 3; k++) {
+    q[k] = x[k] - run->middle[k];
+    size += fabs(x[k]);
+  }
+  return fabs(dot(run->tangent, q)) > run->spread * norm(q) + run->radius + half + 1e-12 * size;
+}
+
+size_t sweep_next_near(const sweep_path *path, size_t piece, const double *x, double half) {
+  while (piece < path->pieces && piece % SWEEP_RUN == 0 && is_far(path, path->run + piece / SWEEP_RUN, x, half))
+    piece += SWEEP_RUN;
+  return piece < path->pieces ? piece : path->pieces;
+}
+
 /* ---- making ---------------------------------------------------------------------------------------- */
 
 static batten_status check_path(batten_context *ctx, size_t count, const double *points, bool closed) {
@@ -393,6 +443,7 @@ batten_status sweep_path_make(batten_context *ctx, size_t count, const double *p
   }
   if (st >= 0) st = set_pieces(ctx, path, count, points, row, framed, least);
   if (st >= 0) st = set_nodes(ctx, path, framed, up);
+  if (st >= 0 && framed && path->smooth) st = set_runs(ctx, path);
   batten_free(ctx, row);
   if (st >= 0)
     *out = path;
@@ -405,6 +456,7 @@ void sweep_path_free(sweep_path *path) {
   if (!path) return;
   batten_free(path->ctx, path->piece);
   batten_free(path->ctx, path->node);
+  batten_free(path->ctx, path->run);
   batten_free(path->ctx, path);
 }
 
@@ -412,10 +464,9 @@ void sweep_path_box(const sweep_path *path, double *lower, double *upper) {
   for (size_t k = 0; k < 3; k++) {
     lower[k] = INFINITY;
     upper[k] = -INFINITY;
-    for (size_t i = 0; i < path->pieces; i++)
-      for (int j = 0; j < 4; j++) {
-        lower[k] = fmin(lower[k], path->piece[i].b[j][k]);
-        upper[k] = fmax(upper[k], path->piece[i].b[j][k]);
-      }
+    for (size_t i = 0; i < path->pieces; i++) {
+      lower[k] = fmin(lower[k], path->piece[i].low[k]);
+      upper[k] = fmax(upper[k], path->piece[i].high[k]);
+    }
   }
 }

@@ -90,7 +90,8 @@ static batten_status evaluate_smooth(const sweep_path *path, frep_gather *g, siz
     difference(points + 3 * i, path->base, x);
     for (int end = 0; st >= 0 && end < 2 && !path->closed; end++)
       if (place_beyond(path, end, x, &place)) st = frep_gather_add(g, i, &place);
-    for (size_t k = 0; st >= 0 && k < path->pieces; k++) {
+    for (size_t k = sweep_next_near(path, 0, x, 0); st >= 0 && k < path->pieces;
+         k = sweep_next_near(path, k + 1, x, 0)) {
       size_t found = sweep_roots(path, k, x, roots);
       for (size_t j = 0; st >= 0 && j < found; j++) {
         place_at(path, k, roots[j], x, &place);
@@ -295,7 +296,16 @@ static batten_status bounds_smooth(const sweep_path *path, frep_gather *g, size_
   batten_status st = BATTEN_OK;
   counts[0] = !path->closed && sign_at(path, 0, x) <= 0;
   counts[slots - 1] = !path->closed && sign_at(path, pieces, x) >= 0;
-  for (size_t k = 0; k < pieces; k++) counts[k + 1] = root_range(path, k, x, roots + k + 1);
+  double middle[3], half[3];
+  for (int k = 0; k < 3; k++) {
+    middle[k] = x[k].lo / 2 + x[k].hi / 2;
+    half[k] = x[k].hi / 2 - x[k].lo / 2;
+  }
+  double reach = sqrt(dot(half, half));
+  memset(counts + 1, 0, pieces);
+  for (size_t k = sweep_next_near(path, 0, middle, reach); k < pieces;
+       k = sweep_next_near(path, k + 1, middle, reach))
+    counts[k + 1] = root_range(path, k, x, roots + k + 1);
   if (path->closed) {
     while (start < pieces && counts[start + 1]) start++;
     if (start == pieces) start = 0; /* all count: none is sure, but there is a root somewhere */
