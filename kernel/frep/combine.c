@@ -328,7 +328,8 @@ static batten_status blend_evaluate(const batten_frep *a, batten_context *ctx, s
   for (size_t i = 0; i < count; i++) {
     double *df = gradients ? gradients + n * i : NULL, *dg = g + count + n * i;
     double p = values[i] / a1, q = g[i] / a2, below = 1 + p * p + q * q, add = a0 / below, add_gradient[3];
-    for (size_t k = 0; df && k < n; k++) add_gradient[k] = -2 * add / below * (p / a1 * df[k] + q / a2 * dg[k]);
+    double by_f = -2 * add * (p / below / a1), by_g = -2 * add * (q / below / a2); /* so that widths may be tiny */
+    for (size_t k = 0; df && k < n; k++) add_gradient[k] = by_f * df[k] + by_g * dg[k];
     batten_carrier_combine(a->n, 0, sign, 1, values + i, df, NULL, g + i, df ? dg : NULL, NULL);
     values[i] += add;
     for (size_t k = 0; df && k < n; k++) df[k] += add_gradient[k];

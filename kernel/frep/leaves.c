@@ -92,9 +92,7 @@ typedef struct cone {
 static cone cone_of(const batten_frep *a) {
   const double *v = a->numbers;
   cone c = {.a = v, .radius = {v[6], v[7]}};
-  double square = 0;
-  for (int k = 0; k < 3; k++) square += (v[3 + k] - v[k]) * (v[3 + k] - v[k]);
-  c.length = sqrt(square);
+  c.length = hypot(hypot(v[3] - v[0], v[4] - v[1]), v[5] - v[2]); /* squares may vanish */
   for (int k = 0; k < 3; k++) c.axis[k] = (v[3 + k] - v[k]) / c.length;
   double rise = c.radius[0] - c.radius[1], slant = hypot(rise, c.length);
   c.side[0] = c.length / slant;
@@ -167,7 +165,9 @@ static double cone_support_bound(const cone *c, const double *lower, const doubl
     along += u[k] * c->axis[k];
     square += u[k] * u[k];
   }
-  double across = sqrt(fmax(square - along * along, 0));
+  double across = 0; /* from the part itself: along^2 taken from the square would leave 1e-8 of rounding */
+  for (int k = 0; k < 3; k++) across += (u[k] - along * c->axis[k]) * (u[k] - along * c->axis[k]);
+  across = sqrt(across);
   for (int k = 0; k < 3; k++) {
     double nearest = u[k] > 0 ? lower[k] : upper[k];
     reach += u[k] * (nearest - c->a[k]);
@@ -208,11 +208,11 @@ static batten_status cone_bounds(const batten_frep *a, batten_context *ctx, size
   return BATTEN_OK;
 }
 
-/* Discs of radius r across the axis reach r sqrt(1 - axis_k^2) along coordinate k. */
+/* Discs of radius r across the axis reach r sqrt(1 - axis_k^2) along coordinate k: the other two of the axis. */
 static bool cone_box(const batten_frep *a, double *lower, double *upper) {
   cone c = cone_of(a);
   for (int k = 0; k < 3; k++) {
-    double reach = sqrt(fmax(1 - c.axis[k] * c.axis[k], 0)) + 0x1p-46;
+    double reach = hypot(c.axis[(k + 1) % 3], c.axis[(k + 2) % 3]) + 0x1p-46;
     lower[k] = fmin(a->numbers[k] - c.radius[0] * reach, a->numbers[3 + k] - c.radius[1] * reach);
     upper[k] = fmax(a->numbers[k] + c.radius[0] * reach, a->numbers[3 + k] + c.radius[1] * reach);
     interval r = interval_widen(lower[k], upper[k], 4);

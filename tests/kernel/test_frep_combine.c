@@ -1,4 +1,5 @@
 /* The algebra of solids: leaves of its own, set operations, blends, negation, metamorphosis. */
+#include "frep/frep_inner.h"
 #include "frep_checks.h"
 
 static double value_at(batten_context *ctx, const batten_frep *a, double x, double y, double z) {
@@ -37,6 +38,19 @@ static void test_leaves(batten_context *ctx) {
   worst = fmax(worst, fabs(value_at(ctx, a, 6, 0, -4) + 5));
   worst = fmax(worst, fabs(value_at(ctx, a, 2, 0, -3) + 3));
   T_RATIO(worst, 1e-14, "cone at points by hand");
+  batten_frep_free(a);
+  /* cones that are all but a disc: outward directions lie within 1e-9 of the axis */
+  T_OK(batten_frep_cone(ctx, (double[]){0, 0, 0}, (double[]){0, 0, 1e-9}, 1, 0, &a), ctx);
+  frep_check_bounds(ctx, "flat cone", a, 2, 50000, 3);
+  batten_frep_free(a);
+  double lower[3], upper[3];
+  T_OK(batten_frep_cone(ctx, (double[]){0, 0, 0}, (double[]){1e-9, 0, 1}, 1, 1, &a), ctx);
+  T_CHECK(frep_structural_box(a, lower, upper), "a cone off the z axis by 1e-9 has a box");
+  T_CHECK(value_at(ctx, a, 1, 0, -0.9999e-9) >= 0 && lower[2] <= -0.9999e-9, "from %.3g: it holds the rim", lower[2]);
+  batten_frep_free(a);
+  T_OK(batten_frep_cone(ctx, (double[]){1e-160, 0, 0}, (double[]){0, 0, 0}, 1, 1, &a), ctx);
+  frep_check_bounds(ctx, "cone of a length whose square vanishes", a, 2, 1024, 4);
+  T_RATIO(fabs(value_at(ctx, a, 0, 3, 0) + 2), 1e-15, "it is a disc");
   batten_frep_free(a);
   T_OK(batten_frep_ball(ctx, 2, (double[]){0.1, 0.2}, 0.5, &a), ctx);
   frep_check(ctx, "disc", a, 1, 0, 1e-8, 20000);
@@ -156,6 +170,29 @@ static void test_blend_reach(batten_context *ctx) {
   }
   batten_frep_free(floor);
   batten_frep_free(wall);
+}
+
+/* Widths so small or large that the squares of f / a1 overflow or vanish: no more than the operation, or the same
+ * addition everywhere; gradients stay finite. */
+static void test_blend_widths(batten_context *ctx) {
+  const double widths[3] = {1e-200, 1e-100, 1e200};
+  parts3 p = make_parts(ctx);
+  batten_frep *plain = NULL, *blend = NULL;
+  T_OK(batten_frep_combine(ctx, BATTEN_FREP_UNION, p.ball, p.cone, 0, &plain), ctx);
+  for (int i = 0; i < 3; i++) {
+    T_OK(batten_frep_blend(ctx, BATTEN_FREP_UNION, p.ball, p.cone, 0.25, widths[i], widths[i], &blend), ctx);
+    const double x[3] = {0.3, 0.4, 0.2};
+    double f, g, df[3], dg[3];
+    bool same = true;
+    T_OK(batten_frep_evaluate(ctx, plain, 1, x, &f, df), ctx);
+    T_OK(batten_frep_evaluate(ctx, blend, 1, x, &g, dg), ctx);
+    for (int k = 0; k < 3; k++) same = same && df[k] == dg[k];
+    T_CHECK(g == f + (i == 2 ? 0.25 : 0) && same, "a blend of width %g adds %g", widths[i], g - f);
+    frep_check_bounds(ctx, "it", blend, 2, 1024, 8);
+    batten_frep_free(blend);
+  }
+  batten_frep_free(plain);
+  free_parts(p);
 }
 
 static void test_sharing(batten_context *ctx) {
@@ -285,6 +322,7 @@ int main(void) {
   test_identities(ctx);
   test_morph(ctx);
   test_blend_reach(ctx);
+  test_blend_widths(ctx);
   test_sharing(ctx);
   test_bad(ctx);
   t_fail_every_allocation("building and using a tree", build_and_use, NULL);
