@@ -1,4 +1,4 @@
-/* Quadratic models over boxes: their range, and the difference of two. */
+/* Quadratic models over boxes: their range, how steep they are, and the difference of two. */
 #include "basis/taylor.h"
 
 #include "base/checked.h"
@@ -77,8 +77,47 @@ interval batten_taylor_range(unsigned n, const taylor_box *box, const taylor *t)
   return interval_meet(t->range, (interval){lo, hi});
 }
 
-taylor batten_taylor_of_range(double lo, double hi) {
-  taylor t = {.rest = INFINITY, .range = interval_all()};
+/* slope + bend d is longest in a corner of the box. Along the slope in the middle it is at least what the bend leaves
+ * of it. */
+interval batten_taylor_steep(unsigned n, const taylor_box *box, const taylor *t) {
+  if (!(t->rest_slope < INFINITY)) return t->steep;
+  double most = 0, square = 0, size = 0, change = 0;
+  for (unsigned corner = 0; corner < 1u << n; corner++) {
+    double length = 0;
+    for (unsigned a = 0; a < n; a++) {
+      double g = t->slope[a];
+      for (unsigned b = 0; b < n; b++)
+        g += t->bend[TAYLOR_BEND[a][b]] * (corner >> b & 1 ? box->radius[b] : -box->radius[b]);
+      length += g * g;
+    }
+    most = fmax(most, length);
+  }
+  for (unsigned a = 0; a < n; a++) {
+    square += t->slope[a] * t->slope[a];
+    for (unsigned b = 0; b < n; b++) size += fabs(t->bend[TAYLOR_BEND[a][b]]) * box->radius[b];
+  }
+  most = sqrt(most);
+  double middle = sqrt(square);
+  for (unsigned b = 0; b < n && middle > 0; b++) {
+    double along = 0;
+    for (unsigned a = 0; a < n; a++) along += t->slope[a] / middle * t->bend[TAYLOR_BEND[a][b]];
+    change += fabs(along) * box->radius[b];
+  }
+  double slack = t->rest_slope + ROUNDING * (middle + size) + 0x1p-500; /* squares that vanish */
+  double lo = fmax(middle - change - slack, 0), hi = most + slack;
+  if (!(lo <= hi)) return t->steep; /* NaN: the model has overflowed */
+  return interval_meet(t->steep, (interval){lo, hi});
+}
+
+interval batten_steep_add(interval f, interval g) {
+  interval r = interval_widen(fmax(f.lo - g.hi, g.lo - f.hi), f.hi + g.hi, 1);
+  if (!(r.lo > 0)) r.lo = 0;
+  return r;
+}
+
+taylor batten_taylor_of_range(double lo, double hi, interval steep) {
+  taylor t = {.rest = INFINITY, .rest_slope = INFINITY, .range = interval_all(), .steep = batten_steep_unknown()};
+  if (steep.lo <= steep.hi && steep.lo >= 0) t.steep = steep;
   if (lo <= hi) t.range = (interval){lo, hi};
   return t;
 }
@@ -89,6 +128,14 @@ taylor batten_taylor_difference(unsigned n, const taylor_box *box, int sign, con
   for (unsigned k = 0; k < 6; k++) t.bend[k] = sign * (f->bend[k] - g->bend[k]);
   t.rest = f->rest + g->rest +
            ROUNDING * (batten_taylor_size(n, box, f) + batten_taylor_size(n, box, g) + f->rest + g->rest);
+  t.rest_slope = (f->rest_slope + g->rest_slope) * (1 + ROUNDING);
+  for (unsigned k = 0; k < n; k++) {
+    double size = fabs(f->slope[k]) + fabs(g->slope[k]);
+    for (unsigned j = 0; j < n; j++)
+      size += (fabs(f->bend[TAYLOR_BEND[k][j]]) + fabs(g->bend[TAYLOR_BEND[k][j]])) * box->radius[j];
+    t.rest_slope += ROUNDING * size;
+  }
+  t.steep = batten_steep_add(f->steep, g->steep);
   t.range = interval_sub(f->range, g->range);
   if (sign < 0) t.range = interval_neg(t.range);
   return t;

@@ -501,20 +501,26 @@ static batten_status negation_evaluate(const batten_frep *a, batten_context *ctx
   return st;
 }
 
-static batten_status negation_bounds(const batten_frep *a, batten_context *ctx, size_t count, const double *boxes,
-                                     double *ranges) {
-  batten_status st = frep_bounds_block(a->children[0], ctx, count, boxes, ranges);
-  for (size_t i = 0; st >= 0 && i < count; i++) {
+static void turn_ranges(size_t count, double *ranges) {
+  for (size_t i = 0; i < count; i++) {
     double lo = ranges[2 * i];
     ranges[2 * i] = -ranges[2 * i + 1];
     ranges[2 * i + 1] = -lo;
   }
+}
+
+static batten_status negation_bounds(const batten_frep *a, batten_context *ctx, size_t count, const double *boxes,
+                                     double *ranges) {
+  batten_status st = frep_bounds_block(a->children[0], ctx, count, boxes, ranges);
+  if (st >= 0) turn_ranges(count, ranges);
   return st;
 }
 
-static batten_status negation_slopes(const batten_frep *a, batten_context *ctx, size_t count, const double *boxes,
-                                     double *slopes) {
-  return frep_slopes_block(a->children[0], ctx, count, boxes, slopes);
+static batten_status negation_both(const batten_frep *a, batten_context *ctx, size_t count, const double *boxes,
+                                   double *ranges, double *slopes) {
+  batten_status st = frep_both_block(a->children[0], ctx, count, boxes, ranges, slopes);
+  if (st >= 0) turn_ranges(count, ranges);
+  return st;
 }
 
 batten_status batten_frep_negation(batten_context *ctx, batten_frep *a, batten_frep **out) {
@@ -536,7 +542,7 @@ const frep_class frep_class_negation = {.kind = BATTEN_FREP_KIND_NEGATION,
                                         .name = "negation",
                                         .evaluate = negation_evaluate,
                                         .bounds = negation_bounds,
-                                        .slopes = negation_slopes,
+                                        .both = negation_both,
                                         .create = create_negation};
 
 /* ---- metamorphosis ------------------------------------------------------------------------------------- */

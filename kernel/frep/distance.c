@@ -7,8 +7,8 @@
  * grad f / w^3, with H grad f from two gradients at a ten thousandth of N before and behind along grad f: the term
  * counts as much as N does, so the step may shrink with it.
  *
- * N grows with f and falls with |grad f|: ranges of f and an upper bound of the slope give the bound of |N| below
- * that leaves out empty space.   [noise: Savchenko et al. 1995, section 5.5; Pasko, Savchenko 1993] */
+ * |N| grows with |f| and falls with |grad f|: ranges of f and bounds of the slope give those of N.
+ *   [noise: Savchenko et al. 1995, section 5.5; Pasko, Savchenko 1993] */
 #include "base/checked.h"
 #include "frep/frep_inner.h"
 
@@ -90,18 +90,22 @@ static batten_status normalize_evaluate(const batten_frep *a, batten_context *ct
   return st;
 }
 
+/* N from the lower end of f and the slope at which it is least. An infinite slope or end tells the sign alone. */
+static double least_ratio(double f, double slope, double limit) {
+  if (f >= 0) return isinf(slope) || isinf(f) ? 0 : bounded_ratio(f, slope, limit);
+  return slope > 0 && !isinf(f) ? bounded_ratio(f, slope, limit) : -limit;
+}
+
 static batten_status normalize_bounds(const batten_frep *a, batten_context *ctx, size_t count, const double *boxes,
                                       double *ranges) {
   const double limit = ((const normalized *)a->state)->limit;
-  double *slopes = batten_alloc_array(ctx, count, sizeof *slopes);
+  double *slopes = batten_alloc_array(ctx, count, 2 * sizeof *slopes);
   if (!slopes) return BATTEN_E_NOMEM;
-  batten_status st = frep_bounds_block(a->children[0], ctx, count, boxes, ranges);
-  if (st >= 0) st = frep_slopes_block(a->children[0], ctx, count, boxes, slopes);
+  batten_status st = frep_both_block(a->children[0], ctx, count, boxes, ranges, slopes);
   for (size_t i = 0; st >= 0 && i < count; i++) {
-    double lo = ranges[2 * i], hi = ranges[2 * i + 1];
-    lo = lo >= 0 ? isinf(slopes[i]) || isinf(lo) ? 0 : bounded_ratio(lo, slopes[i], limit) : -limit;
-    hi = hi <= 0 ? isinf(slopes[i]) || isinf(hi) ? 0 : bounded_ratio(hi, slopes[i], limit) : limit;
-    interval r = interval_widen(lo, hi, 8);
+    double lo = ranges[2 * i], hi = ranges[2 * i + 1], least = slopes[2 * i], most = slopes[2 * i + 1];
+    interval r = interval_widen(least_ratio(lo, lo >= 0 ? most : least, limit),
+                                -least_ratio(-hi, -hi >= 0 ? most : least, limit), 8);
     ranges[2 * i] = r.lo;
     ranges[2 * i + 1] = r.hi;
   }

@@ -167,9 +167,29 @@ batten_status frep_bounds_block(const batten_frep *a, batten_context *ctx, size_
 batten_status frep_slopes_block(const batten_frep *a, batten_context *ctx, size_t count, const double *boxes,
                                 double *slopes) {
   if (!a->distance && a->cls->slopes) return a->cls->slopes(a, ctx, count, boxes, slopes);
+  if (!a->distance && a->cls->both) {
+    double *all = batten_alloc_array(ctx, count, 4 * sizeof *all);
+    if (!all) return BATTEN_E_NOMEM;
+    batten_status st = a->cls->both(a, ctx, count, boxes, all, all + 2 * count);
+    for (size_t i = 0; st >= 0 && i < count; i++) slopes[i] = all[2 * count + 2 * i + 1];
+    batten_free(ctx, all);
+    return st;
+  }
   /* A distance grows by at most the way; the rounding of its gradient is far below 1e-12. */
   for (size_t i = 0; i < count; i++) slopes[i] = a->distance ? 1 + 1e-12 : INFINITY;
   return BATTEN_OK;
+}
+
+batten_status frep_both_block(const batten_frep *a, batten_context *ctx, size_t count, const double *boxes,
+                              double *ranges, double *slopes) {
+  if (a->cls->both) return a->cls->both(a, ctx, count, boxes, ranges, slopes);
+  batten_status st = frep_bounds_block(a, ctx, count, boxes, ranges);
+  if (st >= 0) st = frep_slopes_block(a, ctx, count, boxes, slopes);
+  for (size_t i = count; st >= 0 && i-- > 0;) { /* one apart become two apart, from behind */
+    slopes[2 * i + 1] = slopes[i];
+    slopes[2 * i] = 0;
+  }
+  return st;
 }
 
 bool frep_structural_box(const batten_frep *a, double *lower, double *upper) {

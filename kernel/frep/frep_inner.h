@@ -49,9 +49,13 @@ typedef struct frep_class {
                           double *ranges);
   /* Upper bounds of |grad f| over count <= FREP_BLOCK boxes, INFINITY where none is known: what a first-order
    * distance needs of the node below it. Children by frep_slopes_block. NULL: 1 where the node is a distance, else
-   * INFINITY. */
+   * what `both` tells, else INFINITY. */
   batten_status (*slopes)(const batten_frep *a, batten_context *ctx, size_t count, const double *boxes,
                           double *slopes);
+  /* Both at once, where that is cheaper or tells more: ranges as bounds, slopes [count][2] with lower bounds of |grad
+   * f| too. NULL: bounds and slopes, and 0. */
+  batten_status (*both)(const batten_frep *a, batten_context *ctx, size_t count, const double *boxes, double *ranges,
+                        double *slopes);
   /* A finite box that holds f >= 0 if the structure tells one, from those of the children: false = none known.
    * lower, upper [n]; lower > upper: the structure tells that there is nothing. Used as a start, then tightened by
    * bounds. */
@@ -92,6 +96,9 @@ batten_status frep_bounds_block(const batten_frep *a, batten_context *ctx, size_
                                 double *ranges);
 batten_status frep_slopes_block(const batten_frep *a, batten_context *ctx, size_t count, const double *boxes,
                                 double *slopes);
+/* Ranges and slopes [count][2]. */
+batten_status frep_both_block(const batten_frep *a, batten_context *ctx, size_t count, const double *boxes,
+                              double *ranges, double *slopes);
 /* A length and a place to begin with where the structure tells no box: the hull of the boxes that nodes below tell,
  * maps of space left aside. false = no node tells one. */
 bool frep_hint_box(const batten_frep *a, double *lower, double *upper);

@@ -19,10 +19,25 @@ static batten_status tree_bounds(const void *state, batten_context *ctx, size_t 
   return batten_frep_bounds(ctx, state, count, boxes, ranges);
 }
 
+static batten_status tree_slopes(const void *state, batten_context *ctx, size_t count, const double *boxes,
+                                 double *ranges, double *slopes) {
+  const batten_frep *a = state;
+  batten_status st = BATTEN_OK;
+  for (size_t first = 0; st >= 0 && first < count; first += FREP_BLOCK) {
+    size_t now = count - first < FREP_BLOCK ? count - first : FREP_BLOCK;
+    st = frep_both_block(a, ctx, now, boxes + first * 2 * a->n, ranges + 2 * first, slopes + 2 * first);
+  }
+  return st;
+}
+
 static void tree_release(void *state) { batten_frep_free(state); }
 
-static const solid_form tree_form = {
-    .kind = BATTEN_SOLID_TREE, .order = 1, .evaluate = tree_evaluate, .bounds = tree_bounds, .release = tree_release};
+static const solid_form tree_form = {.kind = BATTEN_SOLID_TREE,
+                                     .order = 1,
+                                     .evaluate = tree_evaluate,
+                                     .bounds = tree_bounds,
+                                     .slopes = tree_slopes,
+                                     .release = tree_release};
 
 /* Newton's method along the gradient, each step at most half a cell; a point keeps the place of the least |f|, and
  * stays where it is when there is no slope (0) or no progress. */

@@ -33,25 +33,10 @@ static bool carrier_is_distance(const batten_carrier *c) {
          c->kind == BATTEN_CARRIER_HALF_SPACE;
 }
 
-/* Of R^2 - |x - c|^2 the slope is 2 |x - c|; an ellipsoid's is no steeper, as it weighs each axis by at most 1. */
-static double carrier_slope(const batten_carrier *c, const double *lower, const double *upper) {
-  if (carrier_is_distance(c)) return 1 + 1e-12;
-  if (c->kind == BATTEN_CARRIER_NONE) return 0;
-  if (c->kind != BATTEN_CARRIER_BALL && c->kind != BATTEN_CARRIER_ELLIPSOID) return INFINITY;
-  double square = 0;
-  for (unsigned k = 0; k < c->n; k++) {
-    double far = fmax(fabs(lower[k] - c->parameters[k]), fabs(upper[k] - c->parameters[k]));
-    square += far * far;
-  }
-  return 2 * sqrt(square) * (1 + 1e-8); /* 1e-8: rotations are orthonormal to 1e-9 */
-}
-
-static batten_status carrier_slopes(const batten_frep *a, batten_context *ctx, size_t count, const double *boxes,
-                                    double *slopes) {
-  const size_t n = a->n;
-  (void)ctx;
-  for (size_t i = 0; i < count; i++) slopes[i] = carrier_slope(a->carrier, boxes + 2 * n * i, boxes + 2 * n * i + n);
-  return BATTEN_OK;
+static batten_status field_both(const batten_frep *a, batten_context *ctx, size_t count, const double *boxes,
+                                double *ranges, double *slopes) {
+  if (a->carrier) return batten_carrier_slopes(ctx, a->carrier, count, boxes, ranges, slopes);
+  return batten_solid_slopes(ctx, a->solid, count, boxes, ranges, slopes);
 }
 
 /* Box of one carrier without children: half sizes about its middle. 1e-8: rotations and axes are right to 1e-9. */
@@ -170,13 +155,14 @@ const frep_class frep_class_carrier = {.kind = BATTEN_FREP_KIND_CARRIER,
                                        .name = "carrier",
                                        .evaluate = field_evaluate,
                                        .bounds = field_bounds,
-                                       .slopes = carrier_slopes,
+                                       .both = field_both,
                                        .box = carrier_box,
                                        .create = create_carrier};
 const frep_class frep_class_solid = {.kind = BATTEN_FREP_KIND_SOLID,
                                      .name = "solid",
                                      .evaluate = field_evaluate,
                                      .bounds = field_bounds,
+                                     .both = field_both,
                                      .box = solid_leaf_box,
                                      .create = create_solid};
 

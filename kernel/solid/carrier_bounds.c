@@ -35,7 +35,7 @@ static double reach(unsigned n, const double *center, const taylor_box *box) {
 
 /* Value, slope and, if quadratic, bend in the middle, by the evaluator. */
 static taylor start(const batten_carrier *c, const taylor_box *box, bool quadratic) {
-  taylor t = {.range = interval_all()};
+  taylor t = {.range = interval_all(), .steep = batten_steep_unknown()};
   double hessian[9];
   batten_carrier_shape(c, 1, box->middle, &t.value, t.slope, quadratic ? hessian : NULL);
   for (unsigned a = 0; quadratic && a < c->n; a++)
@@ -53,6 +53,7 @@ static taylor ball(const batten_carrier *c, const taylor_box *box) {
     sum = interval_add(sum, interval_square(interval_sub(span(box, k), interval_of(c->parameters[k]))));
   t.range = interval_sub(interval_square(interval_of(radius)), sum);
   t.rest = ROUNDING * size * size;
+  t.rest_slope = ROUNDING * size;
   return t;
 }
 
@@ -69,12 +70,14 @@ static taylor ellipsoid(const batten_carrier *c, const taylor_box *box) {
   }
   t.range = interval_sub(interval_square(interval_of(least)), sum);
   t.rest = ROUNDING * size * size;
+  t.rest_slope = ROUNDING * size;
   return t;
 }
 
 static taylor half_space(const batten_carrier *c, const taylor_box *box) {
   taylor t = start(c, box, false);
   t.rest = ROUNDING * reach(c->n, c->parameters, box);
+  t.rest_slope = ROUNDING;
   return t;
 }
 
@@ -111,13 +114,21 @@ static interval corner_distance(unsigned n, const interval *e, interval *de) {
   return inside ? (interval){fmin(inner_lo, 0), d.hi} : d;
 }
 
+/* Above the length of a distance's gradient: rotations and axes are right to 1e-9. */
+static const double UNIT = 1 + 1e-8;
+
 /* The rest of a linear model whose gradient lies in g everywhere; size: what roundings are relative to. The squares
  * of lengths under 1e-154 are lost. */
 static void settle_distance(unsigned n, const interval *g, const taylor_box *box, double size, taylor *t) {
-  double slack = ROUNDING * size + 0x1p-500;
+  double slack = ROUNDING * size + 0x1p-500, square = 0;
   t->rest = slack;
-  for (unsigned k = 0; k < n; k++)
-    t->rest += fmax(fabs(g[k].hi - t->slope[k]), fabs(t->slope[k] - g[k].lo)) * box->radius[k] * (1 + 0x1p-48);
+  for (unsigned k = 0; k < n; k++) {
+    double apart = fmax(fabs(g[k].hi - t->slope[k]), fabs(t->slope[k] - g[k].lo));
+    t->rest += apart * box->radius[k] * (1 + 0x1p-48);
+    square += apart * apart;
+  }
+  t->rest_slope = sqrt(square) + ROUNDING;
+  t->steep = (interval){0, UNIT};
   t->range.lo -= slack;
   t->range.hi += slack;
 }
@@ -215,7 +226,7 @@ taylor batten_carrier_shape_model(const batten_carrier *c, const taylor_box *box
     case BATTEN_CARRIER_SOLID:
       break;
   }
-  return (taylor){.range = interval_of(0)};
+  return (taylor){.range = interval_of(0), .steep = interval_of(0)};
 }
 
 /* ---- R-functions --------------------------------------------------------------------------------- */
@@ -247,6 +258,11 @@ static interval change_of_root(double alpha, interval f, interval g) {
   return clip((interval){least - 1e-9, most + 1e-9}, -1, 1);
 }
 
+double batten_carrier_join_steep(double alpha, double f, double g) {
+  double slope = alpha == 1 ? fmax(f, g) : alpha == 0 ? f + g + hypot(f, g) : 2 / (1 + alpha) * (f + g);
+  return slope * (1 + 1e-9);
+}
+
 /* u - u(f0, g0) = U_f (f - f0) + U_g (g - g0) with U_f, U_g among the derivatives over the box: their middles carry
  * the models of f and g on, the rest of them is bounded by the ranges of f - f0 and g - g0. */
 taylor batten_carrier_join_models(unsigned n, const taylor_box *box, double alpha, double sign, const taylor *f,
@@ -256,7 +272,9 @@ taylor batten_carrier_join_models(unsigned n, const taylor_box *box, double alph
   double size = fmax(fabs(of_f.lo), fabs(of_f.hi)) + fmax(fabs(of_g.lo), fabs(of_g.hi));
   /* S^2 is at least (1 + alpha) / 2 of the square of |f| + |g|, and is off by that square times some units. */
   double slack = ROUNDING * size / ((1 + alpha) * (1 + alpha));
-  taylor t = batten_taylor_of_range(lo - (isfinite(lo) ? slack : 0), hi + (isfinite(hi) ? slack : 0));
+  interval steep_f = batten_taylor_steep(n, box, f), steep_g = batten_taylor_steep(n, box, g);
+  interval steep = {0, batten_carrier_join_steep(alpha, steep_f.hi, steep_g.hi)};
+  taylor t = batten_taylor_of_range(lo - (isfinite(lo) ? slack : 0), hi + (isfinite(hi) ? slack : 0), steep);
   if (!(f->rest < INFINITY) || !(g->rest < INFINITY) || !isfinite(slack)) return t;
   interval root_f = change_of_root(alpha, of_f, of_g), root_g = change_of_root(alpha, of_g, of_f);
   double by_f = (1 + sign * (root_f.lo + root_f.hi) / 2) / (1 + alpha);
@@ -269,5 +287,8 @@ taylor batten_carrier_join_models(unsigned n, const taylor_box *box, double alph
   double change_g = fmax(of_g.hi - g->value, g->value - of_g.lo);
   t.rest = (by_f + around_f) * f->rest + (by_g + around_g) * g->rest + around_f * change_f + around_g * change_g +
            slack + (1e-9 * ROUNDING + ROUNDING) * size / (1 + alpha);
+  t.rest_slope = by_f * f->rest_slope + by_g * g->rest_slope;
+  if (around_f > 0) t.rest_slope += around_f * steep_f.hi; /* 0 times infinity is 0 */
+  if (around_g > 0) t.rest_slope += around_g * steep_g.hi;
   return t;
 }

@@ -12,6 +12,10 @@ typedef struct solid_form {
   batten_status (*evaluate)(const void *state, batten_context *ctx, size_t count, const double *points,
                             double *values, double *gradients, double *hessians);
   batten_status (*bounds)(const void *state, batten_context *ctx, size_t count, const double *boxes, double *ranges);
+  /* Ranges as bounds gives them, and slopes [count][2]: lower and upper bounds of |grad f| over the boxes, 0 and
+   * INFINITY where nothing is known. NULL: nothing is. */
+  batten_status (*slopes)(const void *state, batten_context *ctx, size_t count, const double *boxes, double *ranges,
+                          double *slopes);
   void (*release)(void *state);
 } solid_form;
 
@@ -23,5 +27,12 @@ batten_status batten_solid_make(batten_context *ctx, const solid_form *form, voi
 /* The state of a solid of this very form (not NULL), NULL of others. */
 void *batten_solid_state(const batten_solid *s, const solid_form *form);
 unsigned batten_solid_depth(const batten_solid *s);
+
+/* batten_solid_bounds and batten_carrier_bounds, and slopes [count][2] as above: what first-order distances are
+ * bounded by. For spline solids and primitives both narrow as the box shrinks. */
+batten_status batten_solid_slopes(batten_context *ctx, const batten_solid *s, size_t count, const double *boxes,
+                                  double *ranges, double *slopes);
+batten_status batten_carrier_slopes(batten_context *ctx, const batten_carrier *c, size_t count, const double *boxes,
+                                    double *ranges, double *slopes);
 
 #endif

@@ -8,6 +8,8 @@
  *   sup |D2 psi| rho^2 / 2   with its Hessian taken out of the model again
  *   sup |D psi| rho          with both taken out: all that is left where a centre lies in the box and psi has a kink
  *
+ * and of its gradient, by the same choice, sup |D3 psi| rho^2 / 2, sup |D2 psi| rho or sup |D psi|.
+ *
  * |D^k psi| is the norm of a symmetric k-linear form, the largest of |D^k psi[u, .., u]| over unit vectors u. With
  * phi = F_0(r), F_(j+1) = F_j' / r and c the cosine between u and x - centre
  *
@@ -56,7 +58,7 @@ typedef struct bounding {
 /* What is added up for one box. */
 typedef struct tally {
   double lower[3], upper[3], middle[3], radius[3], rho; /* unit box */
-  double rest;
+  double rest, rest_slope;
   double size, size1, size2; /* of the terms, their gradients (both anywhere in the box), their Hessians (middle) */
   double taken[SPLINE_SUMS]; /* gradient and Hessian to take out of the model */
 } tally;
@@ -160,6 +162,7 @@ static void add_sizes(const bounding *b, const distances *d, const distances *mi
 static void choose_orders(const bounding *b, const size_t *order, size_t count, tally *t, unsigned char *how) {
   const spline_terms *terms = &b->spline->terms;
   const double weight[3] = {t->rho, t->rho * t->rho / 2, t->rho * t->rho * t->rho / 6};
+  const double slope_weight[3] = {1, t->rho, t->rho * t->rho / 2};
   for (size_t i = 0; i < count; i++) {
     size_t j = order[i];
     double x[3] = {0, 0, 0}, square = 0, from_middle = 0;
@@ -169,18 +172,19 @@ static void choose_orders(const bounding *b, const size_t *order, size_t count, 
       square += h * h;
       from_middle += (x[a] - t->middle[a]) * (x[a] - t->middle[a]);
     }
-    double w = fabs(terms->w[j]), g = sqrt(square), least = INFINITY, middle = sqrt(from_middle);
+    double w = fabs(terms->w[j]), g = sqrt(square), least = INFINITY, middle = sqrt(from_middle), slope = INFINITY;
     distances d = distances_of_box(b, t, x, x);
     how[i] = 0;
     for (int k = 2; k >= 0; k--) {
       double left = w * largest(&b->norms, k + 1, &d, false);
       if (g > 0) left += g * largest(&b->norms, k + 2, &d, false);
-      left *= weight[k];
-      if (!(left < least)) continue;
-      least = left;
+      if (!(left * weight[k] < least)) continue;
+      least = left * weight[k];
+      slope = left * slope_weight[k];
       how[i] = (unsigned char)k;
     }
     t->rest += least;
+    t->rest_slope += slope;
     /* At a distance that counts as 0 the evaluator leaves the derivatives out. */
     distances at = between(&b->norms, fmax(middle, 1e-90), fmax(middle, 1e-90));
     add_sizes(b, &d, &at, w, g, t);
@@ -235,7 +239,7 @@ static double third_of_cluster(const bounding *b, const spline_cluster *c, const
 /* Walks the clusters: far ones at once, near ones term by term. */
 static void add_clusters(const bounding *b, tally *t) {
   const spline_cluster *nodes = b->spline->clusters.nodes;
-  const double cube = t->rho * t->rho * t->rho / 6;
+  const double square_half = t->rho * t->rho / 2;
   size_t stack[STACK], top = 0;
   if (nodes) stack[top++] = 0;
   while (top > 0) {
@@ -247,7 +251,9 @@ static void add_clusters(const bounding *b, tally *t) {
       square += (c->upper[a] - c->lower[a]) * (c->upper[a] - c->lower[a]);
     /* Farther than the box is large, too: else a term by itself may be bounded better by a lower order. */
     if (d.r[0] > 0 && sqrt(square) <= OPENING * d.r[0] && t->rho <= d.r[0]) {
-      t->rest += cube * third_of_cluster(b, c, &d);
+      double third = third_of_cluster(b, c, &d);
+      t->rest += third * square_half * t->rho / 3;
+      t->rest_slope += third * square_half;
       add_sizes(b, &d, &d, c->w, c->g, t);
     } else if (spline_cluster_is_leaf(c)) {
       add_leaf(b, c, t);
@@ -270,7 +276,9 @@ static void add_polynomial(const batten_spline *s, tally *t) {
     if (degree > 0) t->size1 += c * degree * whole_power(most, degree - 1);
     if (degree > 1) t->size2 += c * degree * (degree - 1) * whole_power(most, degree - 2);
     for (unsigned a = 0; a < 3; a++) cube *= whole_power(t->radius[a], e[a]);
-    if (degree == 3) t->rest += cube;
+    if (degree != 3) continue;
+    t->rest += cube;
+    t->rest_slope += 3 * c * t->rho * t->rho; /* |D x_a x_b x_c| <= rho^2 for each of the three */
   }
 }
 
@@ -296,7 +304,7 @@ static void model_box(const bounding *b, size_t i) {
   tally t = start_tally(s, b->boxes + i);
   add_clusters(b, &t);
   add_polynomial(s, &t);
-  taylor m = {.value = b->values[i], .range = interval_all()};
+  taylor m = {.value = b->values[i], .range = interval_all(), .steep = batten_steep_unknown()};
   double most = 0;
   for (unsigned a = 0; a < n; a++) {
     most = fmax(most, fmax(fabs(t.lower[a]), fabs(t.upper[a])));
@@ -308,6 +316,9 @@ static void model_box(const bounding *b, size_t i) {
    * moves the points by as much as their coordinates are wrong. */
   m.rest = t.rest * (1 + 0x1p-40) +
            b->rounding * (2 * t.size + t.size1 * (2 * t.rho + most) + t.size2 * t.rho * t.rho) + 0x1p-1000;
+  m.rest_slope = (t.rest_slope * (1 + 0x1p-40) + b->rounding * (2 * t.size1 + t.size2 * (2 * t.rho + most))) / scale *
+                     (1 + 0x1p-40) +
+                 0x1p-1000;
   b->models[i] = m;
 }
 
