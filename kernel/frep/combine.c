@@ -147,11 +147,24 @@ static batten_status combine_bounds(const batten_frep *a, batten_context *ctx, s
   return st;
 }
 
-static batten_status combine_slopes(const batten_frep *a, batten_context *ctx, size_t count, const double *boxes,
-                                    double *slopes) {
-  double *g = NULL;
-  batten_status st = call_both(a, ctx, frep_slopes_block, count, boxes, 1, slopes, &g);
-  for (size_t i = 0; st >= 0 && i < count; i++) slopes[i] = join_slope(a->numbers[0], slopes[i], g[i]);
+static batten_status combine_both(const batten_frep *a, batten_context *ctx, size_t count, const double *boxes,
+                                  double *ranges, double *slopes) {
+  double *g = batten_alloc_array(ctx, count, 4 * sizeof *g), *dg = g + 2 * count;
+  if (!g) return BATTEN_E_NOMEM;
+  const double alpha = a->numbers[0], sign = root_sign(a);
+  batten_status st = frep_both_block(a->children[0], ctx, count, boxes, ranges, slopes);
+  if (st >= 0) st = frep_both_block(a->children[1], ctx, count, boxes, g, dg);
+  for (size_t i = 0; st >= 0 && i < count; i++) {
+    interval f = {ranges[2 * i], ranges[2 * i + 1]}, second = second_range(a, g + 2 * i);
+    interval df = {slopes[2 * i], slopes[2 * i + 1]};
+    interval steep =
+        batten_carrier_join_steep(alpha, sign, f, second, df, (interval){dg[2 * i], dg[2 * i + 1]});
+    interval r = join_range(alpha, sign, f, second);
+    ranges[2 * i] = r.lo;
+    ranges[2 * i + 1] = r.hi;
+    slopes[2 * i] = steep.lo;
+    slopes[2 * i + 1] = steep.hi;
+  }
   batten_free(ctx, g);
   return st;
 }
@@ -297,21 +310,21 @@ const frep_class frep_class_union = {.kind = BATTEN_FREP_KIND_UNION,
                                      .name = "union",
                                      .evaluate = combine_evaluate,
                                      .bounds = combine_bounds,
-                                     .slopes = combine_slopes,
+                                     .both = combine_both,
                                      .box = hull_box,
                                      .create = create_union};
 const frep_class frep_class_intersection = {.kind = BATTEN_FREP_KIND_INTERSECTION,
                                             .name = "intersection",
                                             .evaluate = combine_evaluate,
                                             .bounds = combine_bounds,
-                                            .slopes = combine_slopes,
+                                            .both = combine_both,
                                             .box = meet_box,
                                             .create = create_intersection};
 const frep_class frep_class_difference = {.kind = BATTEN_FREP_KIND_DIFFERENCE,
                                           .name = "difference",
                                           .evaluate = combine_evaluate,
                                           .bounds = combine_bounds,
-                                          .slopes = combine_slopes,
+                                          .both = combine_both,
                                           .box = first_box,
                                           .create = create_difference};
 

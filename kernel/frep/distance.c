@@ -132,7 +132,7 @@ static batten_status measure(batten_context *ctx, const batten_frep *a, normaliz
     for (unsigned k = 0; k < a->n; k++) diagonal = hypot(diagonal, upper[k] - lower[k]);
     if (diagonal > 0 && isfinite(diagonal)) state->limit = 10 * diagonal;
   }
-  batten_status st = batten_frep_box(ctx, a, state->lower, state->upper);
+  batten_status st = frep_rough_box(ctx, a, state->lower, state->upper);
   state->boxed = st >= 0;
   return batten_expect(ctx, st, BATTEN_E_NOT_FOUND);
 }

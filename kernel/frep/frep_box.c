@@ -16,6 +16,7 @@ enum {
   BOX_ROUNDS = 200 /* rounds of halving: 20 for a million along each axis, and 7 for a hundredth, three times */
 };
 #define BOX_TIGHT 0.005 /* of the largest extent: how far a box may stick out of what is known to be inside */
+#define BOX_ROUGH 0.04  /* the same where a start for a later search is wanted */
 #define BOX_SLACK 0.004 /* of it, added at last: the surface shall not lie on a face, where a mesh would be cut */
 
 typedef struct box_search {
@@ -25,6 +26,7 @@ typedef struct box_search {
   double *ranges, *middles, *values; /* of FREP_BLOCK boxes */
   double inner[6];                   /* lower and upper [3] each */
   bool some;                         /* anything is known to be inside */
+  double tight;                      /* BOX_TIGHT or BOX_ROUGH */
 } box_search;
 
 static void include(box_search *s, const double *lower, const double *upper) {
@@ -99,7 +101,7 @@ static batten_status judge(box_search *s, batten_context *ctx, size_t first, siz
  * was, or there is no more room. */
 static batten_status refine(box_search *s, batten_context *ctx, bool *done) {
   const unsigned n = s->a->n;
-  const double tight = s->some ? BOX_TIGHT * inner_size(s) : 0;
+  const double tight = s->some ? s->tight * inner_size(s) : 0;
   size_t out = 0;
   for (size_t i = 0; i < s->count; i++) { /* those to be halved to the front, the others after them */
     double *box = s->boxes + 2 * n * i, *place = s->boxes + 2 * n * out;
@@ -157,7 +159,7 @@ static batten_status result(const box_search *s, batten_context *ctx, const doub
   box_search all = *s;
   for (size_t i = 0; i < s->count; i++) include(&all, s->boxes + 2 * n * i, s->boxes + 2 * n * i + n);
   if (!all.some) return nothing(ctx);
-  double size = inner_size(&all), wider = (s->some ? BOX_TIGHT * inner_size(s) : 0) + BOX_SLACK * size;
+  double size = inner_size(&all), wider = (s->some ? s->tight * inner_size(s) : 0) + BOX_SLACK * size;
   for (unsigned k = 0; !structural && k < n; k++)
     if (all.inner[k] - wider <= start[k] || all.inner[3 + k] + wider >= start[n + k])
       return batten_fail(ctx, BATTEN_E_NOT_FOUND,
@@ -172,17 +174,14 @@ static batten_status result(const box_search *s, batten_context *ctx, const doub
   return BATTEN_OK;
 }
 
-batten_status batten_frep_box(batten_context *ctx, const batten_frep *a, double *lower, double *upper) {
-  batten_status st = frep_check_node(ctx, "a", a, 0);
-  if (st >= 0 && (!lower || !upper))
-    st = batten_fail(ctx, BATTEN_E_INVALID, "%s: NULL; give the place for %u numbers", lower ? "upper" : "lower",
-                     a->n);
-  if (st < 0) return st;
+static batten_status find_box(batten_context *ctx, const batten_frep *a, double tight, double *lower,
+                              double *upper) {
+  batten_status st;
   const unsigned n = a->n;
   double start[6];
   bool structural, done = false;
   if (!domain(a, start, &structural)) return nothing(ctx);
-  box_search s = {.a = a, .room = 1024};
+  box_search s = {.a = a, .room = 1024, .tight = tight};
   s.boxes = batten_alloc_array(ctx, s.room, 2 * n * sizeof *s.boxes);
   s.ranges = batten_alloc_array(ctx, FREP_BLOCK, (3 + n) * sizeof *s.ranges);
   st = s.boxes && s.ranges ? BATTEN_OK : BATTEN_E_NOMEM;
@@ -201,4 +200,16 @@ done:
   batten_free(ctx, s.boxes);
   batten_free(ctx, s.ranges);
   return st;
+}
+
+batten_status frep_rough_box(batten_context *ctx, const batten_frep *a, double *lower, double *upper) {
+  return find_box(ctx, a, BOX_ROUGH, lower, upper);
+}
+
+batten_status batten_frep_box(batten_context *ctx, const batten_frep *a, double *lower, double *upper) {
+  batten_status st = frep_check_node(ctx, "a", a, 0);
+  if (st >= 0 && (!lower || !upper))
+    st = batten_fail(ctx, BATTEN_E_INVALID, "%s: NULL; give the place for %u numbers", lower ? "upper" : "lower",
+                     a->n);
+  return st < 0 ? st : find_box(ctx, a, BOX_TIGHT, lower, upper);
 }

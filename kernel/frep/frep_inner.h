@@ -105,6 +105,9 @@ bool frep_hint_box(const batten_frep *a, double *lower, double *upper);
 /* The structural box of a child (class->box or false). */
 bool frep_structural_box(const batten_frep *a, double *lower, double *upper);
 
+/* batten_frep_box, some percent wider and sooner found. */
+batten_status frep_rough_box(batten_context *ctx, const batten_frep *a, double *lower, double *upper);
+
 /* Checks that every constructor does: texts "a: NULL; give a node", "center[1]: nan; give a finite number", "radius:
  * -1; give a positive finite number", "axis: its length is 0; give a direction". */
 batten_status frep_check_out(batten_context *ctx, const void *out);

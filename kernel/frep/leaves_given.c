@@ -3,6 +3,7 @@
 #include "basis/polygon.h"
 #include "frep/frep_inner.h"
 #include "solid/carrier_inner.h"
+#include "solid/solid_form.h"
 
 /* ---- carriers and solids: fields ------------------------------------------------------------------------ */
 

@@ -3,7 +3,8 @@
  * The box is cut into 2^k cells along each axis, none larger than wanted. From the whole box downwards each level's
  * boxes are bounded together; those in which f may change its sign are halved along their long axes. What is left at
  * the end are cells near the surface: f is evaluated at their corners, each once, and on every edge between a corner
- * inside and one outside there is a seed. */
+ * inside and one outside there is a seed. The cells themselves are not bounded: bounds of one cost as much as values
+ * at several points, and would leave out less than one corner for every cell. */
 #include "seeds.h"
 
 #include "table.h"
@@ -46,6 +47,8 @@ static batten_status progress(const search *s, size_t done, size_t of, double le
   double share = s->done + (of ? (double)done / (double)of : 1) * levels;
   return batten_progress(s->sampler->ctx, "search", fmin(share, 1));
 }
+
+static bool at_cells(const search *s) { return s->left[0] + s->left[1] + s->left[2] == 0; }
 
 /* Keeps the boxes in which f may change its sign. */
 static batten_status keep_crossed(search *s, double *numbers, double levels) {
@@ -120,6 +123,7 @@ static batten_status refine(search *s) {
     unsigned halved = 1;
     for (unsigned k = 0; k < s->n; k++) halved += halve[k];
     st = halve_boxes(s, halve);
+    if (st >= 0 && at_cells(s) && halved > 1) break;
     if (st >= 0) st = keep_crossed(s, numbers, 0.5 * halved / (total + s->n));
   } while (st >= 0 && s->count > 0 && choose_axes(s, halve));
   batten_free(s->sampler->ctx, numbers);

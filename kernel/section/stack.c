@@ -45,7 +45,8 @@ static batten_status bounds(const void *state, batten_context *ctx, size_t count
                      : stack_swept_bounds(s, ctx, count, boxes, ranges);
 }
 
-const solid_form stack_form = {BATTEN_SOLID_STACK, 1, evaluate, bounds, release};
+const solid_form stack_form = {
+    .kind = BATTEN_SOLID_STACK, .order = 1, .evaluate = evaluate, .bounds = bounds, .release = release};
 
 /* ---- from sections to a solid ------------------------------------------------------------------------ */
 

@@ -239,9 +239,9 @@ static double join_at(double alpha, double sign, double f, double g) {
   return isnan(f) ? inner : f;
 }
 
-/* All values of (f - alpha g) / S over f and g: the change of S by f, which depends on the angle of (f, g) alone and
- * is 1 on the positive axis of f, -1 on its negative one, and in between at the ends elsewhere. */
-static interval change_of_root(double alpha, interval f, interval g) {
+/* It depends on the angle of (f, g) alone and is 1 on the positive axis of f, -1 on its negative one, and in between
+ * at the ends elsewhere. */
+interval batten_carrier_root_change(double alpha, interval f, interval g) {
   double least = 1, most = -1;
   bool g_has_0 = g.lo <= 0 && g.hi >= 0;
   if ((f.lo <= 0 && f.hi >= 0 && g_has_0) || !isfinite(f.lo) || !isfinite(f.hi) || !isfinite(g.lo) || !isfinite(g.hi))
@@ -258,9 +258,22 @@ static interval change_of_root(double alpha, interval f, interval g) {
   return clip((interval){least - 1e-9, most + 1e-9}, -1, 1);
 }
 
-double batten_carrier_join_steep(double alpha, double f, double g) {
-  double slope = alpha == 1 ? fmax(f, g) : alpha == 0 ? f + g + hypot(f, g) : 2 / (1 + alpha) * (f + g);
-  return slope * (1 + 1e-9);
+interval batten_carrier_join_steep(double alpha, double sign, interval f, interval g, interval df, interval dg) {
+  double most = alpha == 1   ? fmax(df.hi, dg.hi)
+                : alpha == 0 ? df.hi + dg.hi + hypot(df.hi, dg.hi)
+                             : 2 / (1 + alpha) * (df.hi + dg.hi);
+  if (!(most < INFINITY)) return batten_steep_unknown();
+  interval by_f = batten_carrier_root_change(alpha, f, g), by_g = batten_carrier_root_change(alpha, g, f);
+  if (sign < 0) {
+    by_f = interval_neg(by_f);
+    by_g = interval_neg(by_g);
+  }
+  by_f = clip(interval_scale(interval_add(by_f, interval_of(1)), 1 / (1 + alpha)), 0, INFINITY);
+  by_g = clip(interval_scale(interval_add(by_g, interval_of(1)), 1 / (1 + alpha)), 0, INFINITY);
+  interval steep = batten_steep_add(interval_mul(by_f, df), interval_mul(by_g, dg));
+  /* The evaluated derivatives are off by units over 1 + alpha. */
+  double slack = 1e-9 * most;
+  return (interval){fmax(steep.lo - slack, 0), fmin(steep.hi, most) + slack};
 }
 
 /* u - u(f0, g0) = U_f (f - f0) + U_g (g - g0) with U_f, U_g among the derivatives over the box: their middles carry
@@ -273,10 +286,10 @@ taylor batten_carrier_join_models(unsigned n, const taylor_box *box, double alph
   /* S^2 is at least (1 + alpha) / 2 of the square of |f| + |g|, and is off by that square times some units. */
   double slack = ROUNDING * size / ((1 + alpha) * (1 + alpha));
   interval steep_f = batten_taylor_steep(n, box, f), steep_g = batten_taylor_steep(n, box, g);
-  interval steep = {0, batten_carrier_join_steep(alpha, steep_f.hi, steep_g.hi)};
+  interval steep = batten_carrier_join_steep(alpha, sign, of_f, of_g, steep_f, steep_g);
   taylor t = batten_taylor_of_range(lo - (isfinite(lo) ? slack : 0), hi + (isfinite(hi) ? slack : 0), steep);
   if (!(f->rest < INFINITY) || !(g->rest < INFINITY) || !isfinite(slack)) return t;
-  interval root_f = change_of_root(alpha, of_f, of_g), root_g = change_of_root(alpha, of_g, of_f);
+  interval root_f = batten_carrier_root_change(alpha, of_f, of_g), root_g = batten_carrier_root_change(alpha, of_g, of_f);
   double by_f = (1 + sign * (root_f.lo + root_f.hi) / 2) / (1 + alpha);
   double by_g = (1 + sign * (root_g.lo + root_g.hi) / 2) / (1 + alpha);
   double around_f = (root_f.hi - root_f.lo) / 2 / (1 + alpha), around_g = (root_g.hi - root_g.lo) / 2 / (1 + alpha);

@@ -5,6 +5,8 @@
 #include <batten/carrier.h>
 #include <batten/solid.h>
 
+#include "basis/interval.h"
+
 #include <stdatomic.h>
 
 enum {
@@ -36,6 +38,13 @@ void batten_carrier_shape(const batten_carrier *c, size_t count, const double *p
  * replaces f, df and ddf. sign +1 union, -1 intersection. */
 void batten_carrier_combine(unsigned n, double alpha, double sign, size_t count, double *f, double *df, double *ddf,
                             const double *g, const double *dg, const double *ddg);
+
+/* All values of (f - alpha g) / S over f and g: the change of the root S of an R-function by f. */
+interval batten_carrier_root_change(double alpha, interval f, interval g);
+/* Bounds of the slope of an R-function |c_f df + c_g dg| over ranges of f and g, from those of both slopes. For alpha
+ * = 1 one of the partial derivatives is 0 and the other 1, for alpha = 0 they are 1 + cos and 1 + sin of an angle,
+ * and within [0, 2 / (1 + alpha)] in general. */
+interval batten_carrier_join_steep(double alpha, double sign, interval f, interval g, interval df, interval dg);
 
 /* A callback's field at up to CARRIER_BLOCK points with missing derivatives by central differences; checks that what
  * comes back is finite. */

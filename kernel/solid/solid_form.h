@@ -12,11 +12,11 @@ typedef struct solid_form {
   batten_status (*evaluate)(const void *state, batten_context *ctx, size_t count, const double *points,
                             double *values, double *gradients, double *hessians);
   batten_status (*bounds)(const void *state, batten_context *ctx, size_t count, const double *boxes, double *ranges);
+  void (*release)(void *state);
   /* Ranges as bounds gives them, and slopes [count][2]: lower and upper bounds of |grad f| over the boxes, 0 and
    * INFINITY where nothing is known. NULL: nothing is. */
   batten_status (*slopes)(const void *state, batten_context *ctx, size_t count, const double *boxes, double *ranges,
                           double *slopes);
-  void (*release)(void *state);
 } solid_form;
 
 /* depth: levels of nested carriers and solids below (limits recursion: CARRIER_DEPTH). state goes to the solid, which

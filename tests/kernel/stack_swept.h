@@ -60,8 +60,11 @@ static inline batten_status rectangle_bounds(const void *state, batten_context *
   return BATTEN_OK;
 }
 static inline void rectangle_release(void *state) { (void)state; }
-static const solid_form rectangle_form = {BATTEN_SOLID_TREE, 1, rectangle_evaluate, rectangle_bounds,
-                                          rectangle_release};
+static const solid_form rectangle_form = {.kind = BATTEN_SOLID_TREE,
+                                          .order = 1,
+                                          .evaluate = rectangle_evaluate,
+                                          .bounds = rectangle_bounds,
+                                          .release = rectangle_release};
 
 /* A stack of such rectangles in the sections' frames of a scene; t: chord lengths, or given. */
 typedef struct swept_case {
