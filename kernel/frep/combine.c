@@ -157,8 +157,7 @@ static batten_status combine_both(const batten_frep *a, batten_context *ctx, siz
   for (size_t i = 0; st >= 0 && i < count; i++) {
     interval f = {ranges[2 * i], ranges[2 * i + 1]}, second = second_range(a, g + 2 * i);
     interval df = {slopes[2 * i], slopes[2 * i + 1]};
-    interval steep =
-        batten_carrier_join_steep(alpha, sign, f, second, df, (interval){dg[2 * i], dg[2 * i + 1]});
+    interval steep = batten_carrier_join_steep(alpha, sign, f, second, df, (interval){dg[2 * i], dg[2 * i + 1]});
     interval r = join_range(alpha, sign, f, second);
     ranges[2 * i] = r.lo;
     ranges[2 * i + 1] = r.hi;

@@ -13,6 +13,7 @@
 enum {
   BOX_LIMIT = 1 << 18,            /* boxes in the list: a surface of 200 x 200 tiles on each side has as many */
   BOX_LIMIT_STRUCTURAL = 1 << 15, /* where the structure's box will do when bounds are too wide to make it tighter */
+  BOX_LIMIT_ROUGH = 1 << 12,      /* where only a start for a later search is wanted */
   BOX_ROUNDS = 200 /* rounds of halving: 20 for a million along each axis, and 7 for a hundredth, three times */
 };
 #define BOX_TIGHT 0.005 /* of the largest extent: how far a box may stick out of what is known to be inside */
@@ -174,8 +175,7 @@ static batten_status result(const box_search *s, batten_context *ctx, const doub
   return BATTEN_OK;
 }
 
-static batten_status find_box(batten_context *ctx, const batten_frep *a, double tight, double *lower,
-                              double *upper) {
+static batten_status find_box(batten_context *ctx, const batten_frep *a, double tight, double *lower, double *upper) {
   batten_status st;
   const unsigned n = a->n;
   double start[6];
@@ -189,7 +189,7 @@ static batten_status find_box(batten_context *ctx, const batten_frep *a, double 
   s.values = s.ranges + 2 * FREP_BLOCK;
   s.middles = s.values + FREP_BLOCK;
   memcpy(s.boxes, start, 2 * n * sizeof *start);
-  const size_t limit = structural ? BOX_LIMIT_STRUCTURAL : BOX_LIMIT;
+  const size_t limit = !structural ? BOX_LIMIT : tight < BOX_ROUGH ? BOX_LIMIT_STRUCTURAL : BOX_LIMIT_ROUGH;
   st = judge(&s, ctx, 0, 1, &s.count);
   for (int round = 0; st >= 0 && !done && round < BOX_ROUNDS && s.count <= limit / 2; round++) {
     st = batten_progress(ctx, "box", (double)round / BOX_ROUNDS);

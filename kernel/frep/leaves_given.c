@@ -84,16 +84,16 @@ static bool shape_box(const batten_carrier *c, double *lower, double *upper) {
   return true;
 }
 
-/* A reconstructed solid may bulge beyond its data between them: by how much the data do not tell. Half a diagonal is
- * far more than a solid does that has passed the check of its sign. */
+/* A reconstructed solid may bulge beyond its data between them: by how much the data do not tell. A quarter of the
+ * diagonal is far more than a solid does that has passed the check of its sign. */
 static bool solid_box(const batten_solid *s, double *lower, double *upper) {
   const unsigned n = batten_solid_dimension(s);
   double diagonal = 0;
   batten_solid_box(s, lower, upper);
   for (unsigned k = 0; k < n; k++) diagonal = hypot(diagonal, upper[k] - lower[k]);
   for (unsigned k = 0; k < n; k++) {
-    lower[k] -= diagonal / 2;
-    upper[k] += diagonal / 2;
+    lower[k] -= diagonal / 4;
+    upper[k] += diagonal / 4;
   }
   return true;
 }

@@ -7,8 +7,8 @@
 #include "solid/solid_inner.h"
 #include "spline/bounds.h"
 
-static batten_status solid_models(batten_context *ctx, const batten_solid *s, bool wanted, size_t count, const double *boxes,
-                                  const taylor_box *split, taylor *models);
+static batten_status solid_models(batten_context *ctx, const batten_solid *s, bool wanted, size_t count,
+                                  const double *boxes, const taylor_box *split, taylor *models);
 
 typedef batten_status ranges_function(const void *, batten_context *, size_t, const double *, double *);
 typedef batten_status slopes_function(const void *, batten_context *, size_t, const double *, double *, double *);
@@ -28,9 +28,10 @@ static batten_status ask(batten_context *ctx, const void *user, ranges_function 
   return st;
 }
 
-/* Models over up to CARRIER_BLOCK boxes; wanted: slopes are, of forms that take time for them. Recursion no deeper than CARRIER_DEPTH. */
-static batten_status carrier_models(batten_context *ctx, const batten_carrier *c, bool wanted, size_t count, const double *boxes,
-                                    const taylor_box *split, taylor *models) {
+/* Models over up to CARRIER_BLOCK boxes; wanted: slopes are, of forms that take time for them. Recursion no deeper
+ * than CARRIER_DEPTH. */
+static batten_status carrier_models(batten_context *ctx, const batten_carrier *c, bool wanted, size_t count,
+                                    const double *boxes, const taylor_box *split, taylor *models) {
   if (c->kind == BATTEN_CARRIER_SOLID) return solid_models(ctx, c->solid, wanted, count, boxes, split, models);
   if (c->kind == BATTEN_CARRIER_CALLBACK) {
     if (c->field.bounds) return ask(ctx, c->field.user, c->field.bounds, NULL, count, boxes, models);
@@ -53,10 +54,9 @@ static batten_status carrier_models(batten_context *ctx, const batten_carrier *c
   return st;
 }
 
-static batten_status solid_models(batten_context *ctx, const batten_solid *s, bool wanted, size_t count, const double *boxes,
-                                  const taylor_box *split, taylor *models) {
-  if (s->form)
-    return ask(ctx, s->state, s->form->bounds, wanted ? s->form->slopes : NULL, count, boxes, models);
+static batten_status solid_models(batten_context *ctx, const batten_solid *s, bool wanted, size_t count,
+                                  const double *boxes, const taylor_box *split, taylor *models) {
+  if (s->form) return ask(ctx, s->state, s->form->bounds, wanted ? s->form->slopes : NULL, count, boxes, models);
   taylor *splines = batten_alloc_array(ctx, CARRIER_BLOCK, sizeof *splines);
   if (!splines) return BATTEN_E_NOMEM;
   batten_status st = carrier_models(ctx, s->carrier, wanted, count, boxes, split, models);

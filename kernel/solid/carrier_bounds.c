@@ -289,7 +289,8 @@ taylor batten_carrier_join_models(unsigned n, const taylor_box *box, double alph
   interval steep = batten_carrier_join_steep(alpha, sign, of_f, of_g, steep_f, steep_g);
   taylor t = batten_taylor_of_range(lo - (isfinite(lo) ? slack : 0), hi + (isfinite(hi) ? slack : 0), steep);
   if (!(f->rest < INFINITY) || !(g->rest < INFINITY) || !isfinite(slack)) return t;
-  interval root_f = batten_carrier_root_change(alpha, of_f, of_g), root_g = batten_carrier_root_change(alpha, of_g, of_f);
+  interval root_f = batten_carrier_root_change(alpha, of_f, of_g),
+           root_g = batten_carrier_root_change(alpha, of_g, of_f);
   double by_f = (1 + sign * (root_f.lo + root_f.hi) / 2) / (1 + alpha);
   double by_g = (1 + sign * (root_g.lo + root_g.hi) / 2) / (1 + alpha);
   double around_f = (root_f.hi - root_f.lo) / 2 / (1 + alpha), around_g = (root_g.hi - root_g.lo) / 2 / (1 + alpha);

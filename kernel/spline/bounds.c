@@ -8,7 +8,13 @@
  *   sup |D2 psi| rho^2 / 2   with its Hessian taken out of the model again
  *   sup |D psi| rho          with both taken out: all that is left where a centre lies in the box and psi has a kink
  *
- * and of its gradient, by the same choice, sup |D3 psi| rho^2 / 2, sup |D2 psi| rho or sup |D psi|.
+ *
+ * and of a spline with gradient data, whose large coefficients cancel in exact sums alone, also
+ *
+ *   sup |D4 psi| rho^4 / 24  with its third derivatives in the middle added to those of others, whose sum is bounded
+ *
+ * and of its gradient, by the same choice, sup |D4 psi| rho^3 / 6, sup |D3 psi| rho^2 / 2, sup |D2 psi| rho or sup |D
+ * psi|.
  *
  * |D^k psi| is the norm of a symmetric k-linear form, the largest of |D^k psi[u, .., u]| over unit vectors u. With
  * phi = F_0(r), F_(j+1) = F_j' / r and c the cosine between u and x - centre
@@ -26,10 +32,12 @@
 #include "base/checked.h"
 #include "spline/inner.h"
 
-enum { BLOCK = 256, TASK_BOXES = 16, STACK = 128, ORDERS = 7 };
+enum { BLOCK = 256, TASK_BOXES = 16, STACK = 128, ORDERS = 8, THIRDS = 10 };
 /* A cluster is taken at once where its diagonal is at most this share of the distance: half of it gives bounds
  * tighter by a twentieth in four times the time. */
 static const double OPENING = 1.2;
+/* Least distance from the middle at which third derivatives are summed: their powers of it do not overflow. */
+static const double THIRDS_APART = 1e-40;
 /* Unit of rounding errors, twice that of rounding to nearest; the steps of one term and of the sum's two stages, see
  * sum.c (64 terms in a chunk, one addition for every chunk): an ample count of the former. */
 static const double EPS = 0x1p-52, STEPS = 160, CHUNK = 64;
@@ -38,6 +46,7 @@ static const double EPS = 0x1p-52, STEPS = 160, CHUNK = 64;
 typedef struct radial_norms {
   int power;
   double alpha[ORDERS], beta[ORDERS];
+  double a[ORDERS], b[ORDERS]; /* F_j = (a ln r + b) r^(power - 2 j) */
 } radial_norms;
 
 typedef struct distances {
@@ -61,6 +70,8 @@ typedef struct tally {
   double rest, rest_slope;
   double size, size1, size2; /* of the terms, their gradients (both anywhere in the box), their Hessians (middle) */
   double taken[SPLINE_SUMS]; /* gradient and Hessian to take out of the model */
+  double thirds[THIRDS];     /* third derivatives in the middle: xxx xxy xxz xyy xyz xzz yyy yyz yzz zzz */
+  double size3;              /* of what is added up in them */
 } tally;
 
 /* ---- norms of derivatives of the kernel ---------------------------------------------------------- */
@@ -94,6 +105,8 @@ static radial_norms norms_of(unsigned n, unsigned power) {
     b[j + 1] = (out.power - 2 * j) * b[j] + a[j];
   }
   for (int k = 0; k < ORDERS; k++) {
+    out.a[k] = a[k];
+    out.b[k] = b[k];
     out.alpha[k] = largest_form(n, k, a);
     out.beta[k] = largest_form(n, k, b);
   }
@@ -158,11 +171,68 @@ static void add_sizes(const bounding *b, const distances *d, const distances *mi
   t->size2 += g * largest(norms, 3, middle, true);
 }
 
-/* The terms of a leaf, each with the order of its model that leaves least open: how[i] = 0, 1, 2. */
+/* Third derivatives of term j in the middle of the box, at least THIRDS_APART from its centre: with d = x - centre, t
+ * = g . d, F_j as above and sym the sum over the three places of an index, sym(delta_ab u_c) - F_3 sym(g_a d_b d_c) +
+ * k d_a d_b d_c,   u = (w F_2 - t F_3) d - F_2 g,  k = w F_3 - t F_4 */
+static void add_thirds(const bounding *b, size_t j, tally *t) {
+  const spline_terms *terms = &b->spline->terms;
+  const bool hermite = j >= terms->plain;
+  double d[3] = {0, 0, 0}, g[3] = {0, 0, 0}, u[3], square = 0, along = 0;
+  for (unsigned a = 0; a < terms->n; a++) {
+    d[a] = t->middle[a] - terms->x[a][j];
+    if (hermite) g[a] = terms->g[a][j - terms->plain];
+    square += d[a] * d[a];
+    along += g[a] * d[a];
+  }
+  const radial_norms *norms = &b->norms;
+  const double w = terms->w[j], r = sqrt(square), l = norms->power % 2 ? 0 : log(r);
+  const double inverse = 1 / square, r4 = norms->power == 3 ? r * inverse : whole_power(r, norms->power - 4);
+  const double r6 = r4 * inverse, r8 = r6 * inverse; /* r^(p - 4), r^(p - 6), ... */
+  const double f2 = (norms->a[2] * l + norms->b[2]) * r4, f3 = (norms->a[3] * l + norms->b[3]) * r6;
+  const double k = w * f3 - along * (norms->a[4] * l + norms->b[4]) * r8;
+  for (unsigned a = 0; a < 3; a++) u[a] = (w * f2 - along * f3) * d[a] - f2 * g[a];
+  double m[3]; /* sum over the places: k d d d / 3 - F_3 g d d = m d d */
+  for (unsigned a = 0; a < 3; a++) m[a] = k / 3 * d[a] - f3 * g[a];
+  const double xx = d[0] * d[0], yy = d[1] * d[1], zz = d[2] * d[2];
+  const double xy = d[0] * d[1], xz = d[0] * d[2], yz = d[1] * d[2];
+  double *out = t->thirds;
+  out[0] += 3 * (m[0] * xx + u[0]);
+  out[1] += m[1] * xx + 2 * m[0] * xy + u[1];
+  out[2] += m[2] * xx + 2 * m[0] * xz + u[2];
+  out[3] += m[0] * yy + 2 * m[1] * xy + u[0];
+  out[4] += m[0] * yz + m[1] * xz + m[2] * xy;
+  out[5] += m[0] * zz + 2 * m[2] * xz + u[0];
+  out[6] += 3 * (m[1] * yy + u[1]);
+  out[7] += m[2] * yy + 2 * m[1] * yz + u[2];
+  out[8] += m[1] * zz + 2 * m[2] * yz + u[1];
+  out[9] += 3 * (m[2] * zz + u[2]);
+}
+
+/* What the third derivatives add to f and its gradient over the box, at most, is left out too. */
+static void close_thirds(const bounding *b, tally *t) {
+  double square = 0, all = 0;
+  for (unsigned p = 0; p < b->spline->parts.n; p++) {
+    double along = 0;
+    for (unsigned q = 0; q < b->spline->parts.n; q++)
+      for (unsigned s = 0; s < b->spline->parts.n; s++) {
+        static const unsigned char place[3][3][3] = {
+            {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}}, {{1, 3, 4}, {3, 6, 7}, {4, 7, 8}}, {{2, 4, 5}, {4, 7, 8}, {5, 8, 9}}};
+        along += fabs(t->thirds[place[p][q][s]]) * t->radius[q] * t->radius[s];
+      }
+    square += along * along;
+    all += along * t->radius[p];
+  }
+  double rounding = b->rounding * t->size3 * t->rho * t->rho;
+  t->rest += all / 6 + rounding * t->rho;
+  t->rest_slope += sqrt(square) / 2 + rounding;
+}
+
+/* The terms of a leaf, each with the order of its model that leaves least open: how[i] = 0 .. 3. */
 static void choose_orders(const bounding *b, const size_t *order, size_t count, tally *t, unsigned char *how) {
   const spline_terms *terms = &b->spline->terms;
-  const double weight[3] = {t->rho, t->rho * t->rho / 2, t->rho * t->rho * t->rho / 6};
-  const double slope_weight[3] = {1, t->rho, t->rho * t->rho / 2};
+  const double square_half = t->rho * t->rho / 2, cube = square_half * t->rho / 3;
+  const double weight[4] = {t->rho, square_half, cube, cube * t->rho / 4},
+               slope_weight[4] = {1, t->rho, square_half, cube};
   for (size_t i = 0; i < count; i++) {
     size_t j = order[i];
     double x[3] = {0, 0, 0}, square = 0, from_middle = 0;
@@ -175,7 +245,7 @@ static void choose_orders(const bounding *b, const size_t *order, size_t count, 
     double w = fabs(terms->w[j]), g = sqrt(square), least = INFINITY, middle = sqrt(from_middle), slope = INFINITY;
     distances d = distances_of_box(b, t, x, x);
     how[i] = 0;
-    for (int k = 2; k >= 0; k--) {
+    for (int k = terms->hermite && middle > THIRDS_APART ? 3 : 2; k >= 0; k--) {
       double left = w * largest(&b->norms, k + 1, &d, false);
       if (g > 0) left += g * largest(&b->norms, k + 2, &d, false);
       if (!(left * weight[k] < least)) continue;
@@ -188,6 +258,9 @@ static void choose_orders(const bounding *b, const size_t *order, size_t count, 
     /* At a distance that counts as 0 the evaluator leaves the derivatives out. */
     distances at = between(&b->norms, fmax(middle, 1e-90), fmax(middle, 1e-90));
     add_sizes(b, &d, &at, w, g, t);
+    if (how[i] < 3) continue;
+    t->size3 += w * largest(&b->norms, 3, &d, true) + g * largest(&b->norms, 4, &d, true);
+    add_thirds(b, j, t);
   }
 }
 
@@ -227,19 +300,36 @@ static void add_leaf(const bounding *b, const spline_cluster *c, tally *t) {
   for (unsigned q = 1; q < SPLINE_SUMS; q++) t->taken[q] += constant[q] + (q < 4 ? 0 : linear[q]);
 }
 
-/* What the model of a far cluster leaves out, over rho^3 / 6. */
-static double third_of_cluster(const bounding *b, const spline_cluster *c, const distances *d) {
-  double norm[ORDERS], apart, together = 0;
-  for (int k = 3; k < ORDERS; k++) norm[k] = largest(&b->norms, k, d, false);
-  apart = c->w * norm[3] + c->g * norm[4];
-  for (int k = 0; k < 4; k++) together += c->moments[k] * norm[3 + k];
+/* |D^order| of a far cluster, order 3 or 4. */
+static double norm_of_cluster(const bounding *b, const spline_cluster *c, const distances *d, int order) {
+  double norm[4], apart, together = 0;
+  for (int k = 0; k < 4; k++) norm[k] = largest(&b->norms, order + k, d, false);
+  apart = c->w * norm[0] + c->g * norm[1];
+  for (int k = 0; k < 4; k++) together += c->moments[k] * norm[k];
   return fmin(apart, together);
+}
+
+static void add_far_cluster(const bounding *b, const spline_cluster *c, const distances *d, tally *t) {
+  const double square_half = t->rho * t->rho / 2;
+  double left = norm_of_cluster(b, c, d, 3) * square_half, slope = left; /* of the gradient */
+  left *= t->rho / 3;
+  if (b->spline->terms.hermite && d->r[0] > THIRDS_APART) {
+    double fourth = norm_of_cluster(b, c, d, 4) * square_half * t->rho / 3;
+    if (fourth * t->rho / 4 < left) {
+      left = fourth * t->rho / 4;
+      slope = fourth;
+      t->size3 += c->w * largest(&b->norms, 3, d, true) + c->g * largest(&b->norms, 4, d, true);
+      for (size_t i = c->low; i < c->high; i++) add_thirds(b, b->spline->clusters.order[i], t);
+    }
+  }
+  t->rest += left;
+  t->rest_slope += slope;
+  add_sizes(b, d, d, c->w, c->g, t);
 }
 
 /* Walks the clusters: far ones at once, near ones term by term. */
 static void add_clusters(const bounding *b, tally *t) {
   const spline_cluster *nodes = b->spline->clusters.nodes;
-  const double square_half = t->rho * t->rho / 2;
   size_t stack[STACK], top = 0;
   if (nodes) stack[top++] = 0;
   while (top > 0) {
@@ -251,10 +341,7 @@ static void add_clusters(const bounding *b, tally *t) {
       square += (c->upper[a] - c->lower[a]) * (c->upper[a] - c->lower[a]);
     /* Farther than the box is large, too: else a term by itself may be bounded better by a lower order. */
     if (d.r[0] > 0 && sqrt(square) <= OPENING * d.r[0] && t->rho <= d.r[0]) {
-      double third = third_of_cluster(b, c, &d);
-      t->rest += third * square_half * t->rho / 3;
-      t->rest_slope += third * square_half;
-      add_sizes(b, &d, &d, c->w, c->g, t);
+      add_far_cluster(b, c, &d, t);
     } else if (spline_cluster_is_leaf(c)) {
       add_leaf(b, c, t);
     } else {
@@ -303,6 +390,7 @@ static void model_box(const bounding *b, size_t i) {
   const double scale = s->parts.scale;
   tally t = start_tally(s, b->boxes + i);
   add_clusters(b, &t);
+  close_thirds(b, &t);
   add_polynomial(s, &t);
   taylor m = {.value = b->values[i], .range = interval_all(), .steep = batten_steep_unknown()};
   double most = 0;
