@@ -2,12 +2,15 @@
  *
  * All decisions are taken on signs of determinants that are exact, so loops that touch, and points that lie on an
  * edge, need no tolerance. Loops may touch at vertices; what they may not do is pass from one side of another (or of
- * themselves) to the other, or run along it: then no way round has the area on the left throughout. Where two loops
- * meet at a vertex, they pass through each other when the directions of one part those of the other in cyclic order.
- * Loops that do not cross lie within each other or not as a whole, so one point off the other loop tells. Pairs of
- * edges that may meet, and the edges that a ray meets, come from a tree of boxes. */
+ * themselves) to the other, or run along it: then no way round has the area on the left throughout. A loop's own
+ * edges that run there and back between the same points bound nothing: they are taken out, which parts it into
+ * several (a hole tied to its outer loop, as medical contours come, becomes a loop of its own). Where two loops meet
+ * at a vertex, they pass through each other when the directions of one part those of the other in cyclic order. Loops
+ * that do not cross lie within each other or not as a whole, so one point off the other loop tells. Pairs of edges
+ * that may meet, and the edges that a ray meets, come from a tree of boxes. */
 #include "basis/polygon.h"
 
+#include <stdlib.h>
 #include <string.h>
 
 #include "base/checked.h"
@@ -18,9 +21,9 @@
 typedef struct making {
   polygon_set set;
   size_t *origin;       /* [points] index of a point in what was given */
-  double *areas;        /* [count] signed, as given */
-  unsigned char *marks; /* [count] of the ray's loops */
-  size_t *touched;      /* [count] loops with marks */
+  double *areas;        /* [loops] signed, as given */
+  unsigned char *marks; /* [loops] of the ray's loops */
+  size_t *touched;      /* [loops] loops with marks */
 } making;
 
 enum { MARK_ODD = 1, MARK_ON = 2, MARK_LISTED = 4 };
@@ -58,31 +61,124 @@ double polygon_loop_area(size_t count, const double *points) {
   return sum / 2;
 }
 
-/* Takes over the loops that count, and tells which do not. */
-static void take_loops(making *m, size_t count, const size_t *starts, const double *points, double min_area,
-                       unsigned char *dropped) {
-  polygon_set *p = &m->set;
-  size_t made = 0;
-  p->starts[0] = 0;
-  for (size_t k = 0; k < count; k++) {
-    size_t first = made;
-    for (size_t i = starts[k]; i < starts[k + 1]; i++) {
-      if (made > first && same_place(points + 2 * i, p->points + 2 * (made - 1))) continue;
-      memcpy(p->points + 2 * made, points + 2 * i, 2 * sizeof(double));
-      m->origin[made++] = i;
-    }
-    while (made > first + 1 && same_place(p->points + 2 * first, p->points + 2 * (made - 1))) made--;
-    double area = polygon_loop_area(made - first, p->points + 2 * first);
-    bool keep = made - first >= 3 && fabs(area) >= min_area;
-    if (dropped) dropped[k] = !keep;
-    if (!keep) {
-      made = first;
-      continue;
-    }
-    p->given[p->count] = k;
-    m->areas[p->count] = area;
-    p->starts[++p->count] = made;
+/* An edge by its ends in order, so that both ways along it are found together. */
+typedef struct given_edge {
+  const double *ends[2];
+  bool forward;
+  size_t at;
+} given_edge;
+
+/* Edges of a loop, by the numbers of their first points; after SIZE_MAX: taken out. */
+typedef struct edge_ring {
+  size_t *after, *before;
+  given_edge *sorted;
+} edge_ring;
+
+static int compare_places(const double *a, const double *b) {
+  if (a[0] != b[0]) return a[0] < b[0] ? -1 : 1;
+  return (a[1] > b[1]) - (a[1] < b[1]);
+}
+
+static int compare_ends(const given_edge *a, const given_edge *b) {
+  int order = compare_places(a->ends[0], b->ends[0]);
+  return order != 0 ? order : compare_places(a->ends[1], b->ends[1]);
+}
+
+static int compare_edges(const void *left, const void *right) {
+  const given_edge *a = left, *b = right;
+  int order = compare_ends(a, b);
+  return order != 0 ? order : (a->at > b->at) - (a->at < b->at);
+}
+
+/* Takes out edges i and j, which run there and back: what comes before one goes on with what comes after the other.
+ */
+static void cancel(edge_ring r, size_t i, size_t j) {
+  const size_t joints[2][2] = {{r.before[i], r.after[j]}, {r.before[j], r.after[i]}};
+  for (int k = 0; k < 2; k++) {
+    if (joints[k][0] == i || joints[k][0] == j) continue; /* nothing lies between them on that side */
+    r.after[joints[k][0]] = joints[k][1];
+    r.before[joints[k][1]] = joints[k][0];
   }
+  r.after[i] = r.after[j] = SIZE_MAX;
+}
+
+static void cancel_edges(edge_ring r, size_t count, const double *points) {
+  for (size_t i = 0; i < count; i++) {
+    const double *a = points + 2 * i, *b = points + 2 * (i + 1 < count ? i + 1 : 0);
+    bool forward = compare_places(a, b) < 0;
+    r.sorted[i] = (given_edge){{forward ? a : b, forward ? b : a}, forward, i};
+    r.after[i] = i + 1 < count ? i + 1 : 0;
+    r.before[i] = i > 0 ? i - 1 : count - 1;
+  }
+  qsort(r.sorted, count, sizeof *r.sorted, compare_edges);
+  size_t open = 0; /* edges without an opposite so far go to the front */
+  for (size_t i = 0; i < count; i++) {
+    const given_edge e = r.sorted[i], *last = r.sorted + open - 1;
+    if (open > 0 && last->forward != e.forward && compare_ends(last, &e) == 0) {
+      cancel(r, last->at, e.at);
+      open--;
+    } else {
+      r.sorted[open++] = e;
+    }
+  }
+}
+
+/* The loop's points, neighbouring equal ones once, behind those of the set. Returns how many. */
+static size_t take_points(making *m, size_t from, size_t to, const double *points) {
+  const size_t first = m->set.starts[m->set.count];
+  double *taken = m->set.points + 2 * first;
+  size_t made = 0;
+  for (size_t i = from; i < to; i++) {
+    if (made > 0 && same_place(points + 2 * i, taken + 2 * (made - 1))) continue;
+    memcpy(taken + 2 * made, points + 2 * i, 2 * sizeof *taken);
+    m->origin[first + made++] = i;
+  }
+  while (made > 1 && same_place(taken, taken + 2 * (made - 1))) made--;
+  return made;
+}
+
+/* Takes over the loops that count, and tells of which nothing does. */
+static batten_status take_loops(making *m, size_t count, const size_t *starts, const double *points, double min_area,
+                                unsigned char *dropped) {
+  polygon_set *p = &m->set;
+  size_t longest = 0;
+  for (size_t k = 0; k < count; k++)
+    if (starts[k + 1] - starts[k] > longest) longest = starts[k + 1] - starts[k];
+  edge_ring ring = {batten_alloc_array(p->ctx, longest, sizeof *ring.after),
+                    batten_alloc_array(p->ctx, longest, sizeof *ring.before),
+                    batten_alloc_array(p->ctx, longest, sizeof *ring.sorted)};
+  size_t *origin = batten_alloc_array(p->ctx, longest, sizeof *origin);
+  double *loop = batten_alloc_array(p->ctx, longest, 2 * sizeof *loop);
+  batten_status st = ring.after && ring.before && ring.sorted && origin && loop ? BATTEN_OK : BATTEN_E_NOMEM;
+  p->starts[0] = 0;
+  for (size_t k = 0; st >= 0 && k < count; k++) {
+    const size_t first = p->starts[p->count], taken = take_points(m, starts[k], starts[k + 1], points);
+    memcpy(loop, p->points + 2 * first, taken * 2 * sizeof *loop);
+    memcpy(origin, m->origin + first, taken * sizeof *origin);
+    cancel_edges(ring, taken, loop);
+    if (dropped) dropped[k] = 1;
+    for (size_t from = 0; from < taken; from++) {
+      const size_t begin = p->starts[p->count];
+      size_t made = begin;
+      for (size_t i = from, next; (next = ring.after[i]) != SIZE_MAX; i = next, made++) {
+        memcpy(p->points + 2 * made, loop + 2 * i, 2 * sizeof *loop);
+        m->origin[made] = origin[i];
+        ring.after[i] = SIZE_MAX;
+      }
+      double area = polygon_loop_area(made - begin, p->points + 2 * begin);
+      if (made - begin < 3 || !(fabs(area) >= min_area)) continue;
+      p->given[p->count] = k;
+      m->areas[p->count] = area;
+      p->starts[++p->count] = made;
+      if (dropped) dropped[k] = 0;
+    }
+  }
+  batten_free(p->ctx, ring.after);
+  batten_free(p->ctx, ring.before);
+  batten_free(p->ctx, ring.sorted);
+  batten_free(p->ctx, origin);
+  batten_free(p->ctx, loop);
+  return st;
 }
 
 /* The tree of edges. */
@@ -348,10 +444,10 @@ void polygon_set_free(polygon_set *p) {
   *p = (polygon_set){.ctx = p->ctx};
 }
 
-static batten_status take_room(making *m, size_t count, size_t points) {
+static batten_status take_room(making *m, size_t points) {
   polygon_set *p = &m->set;
-  size_t loops;
-  if (points > UINT32_MAX || !batten_add(count, 1, &loops))
+  const size_t count = points / 3, loops = count + 1; /* those that are parted too */
+  if (points > UINT32_MAX)
     return batten_fail(p->ctx, BATTEN_E_TOO_LARGE, "points: %zu of a section's contours; too many", points);
   p->starts = batten_alloc_array(p->ctx, loops, sizeof *p->starts);
   p->points = batten_alloc_array(p->ctx, points, 2 * sizeof(double));
@@ -371,9 +467,10 @@ static batten_status take_room(making *m, size_t count, size_t points) {
 batten_status polygon_set_make(batten_context *ctx, size_t count, const size_t *starts, const double *points,
                                double min_area, polygon_set *out, unsigned char *dropped, polygon_fault *fault) {
   making m = {.set = {.ctx = ctx}};
-  batten_status st = take_room(&m, count, count > 0 ? starts[count] : 0);
+  batten_status st = take_room(&m, count > 0 ? starts[count] : 0);
   if (st < 0) goto done;
-  take_loops(&m, count, starts, points, min_area, dropped);
+  st = take_loops(&m, count, starts, points, min_area, dropped);
+  if (st < 0) goto done;
   if (m.set.count > 0) {
     st = index_edges(&m.set);
     if (st < 0) goto done;

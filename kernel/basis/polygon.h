@@ -34,7 +34,7 @@ typedef struct polygon_set {
   size_t *starts;  /* [count + 1] */
   double *points;  /* [starts[count]][2]; the area lies on the left: outer loops counter-clockwise, holes clockwise;
                       no two neighbours equal, the first not repeated */
-  size_t *given;   /* [count] number of the loop in what was given */
+  size_t *given;   /* [count] number of the loop in what was given, increasing */
   size_t *parent;  /* [count] the loop directly around, SIZE_MAX = none */
   unsigned *depth; /* [count] even: outer, odd: hole */
   double lower[2], upper[2];
@@ -51,9 +51,10 @@ typedef struct polygon_fault {
   double at[2];
 } polygon_fault;
 
-/* Loops [count]: starts [count + 1], points [..][2], finite and below 1e150. Neighbouring equal points become one,
- * loops with fewer than three points or |area| < min_area (>= 0) are left out: dropped [count] (NULL: not wanted)
- * tells 1 for these. Loops that cross or overlap along an edge (touching at a vertex is none, passing through another
+/* Loops [count]: starts [count + 1], points [..][2], finite and below 1e150. Neighbouring equal points become one;
+ * edges of a loop that run there and back between the same points are taken out, which may part it into several; what
+ * has fewer than three points or |area| < min_area (>= 0) then is left out: dropped [count] (NULL: not wanted) tells 1
+ * for loops of which nothing is left. Loops that cross or overlap along an edge (touching at a vertex is none, passing through another
  * loop at a vertex is): *fault is set, and the status INVALID without a text, *out untouched. Crossings are found
  * exactly (signs of determinants by mesh/predicates.h), in O(E log E) for usual data. No loop left: OK with count =
  * 0. Fails: INVALID, TOO_LARGE, NOMEM. */

@@ -129,6 +129,76 @@ static void expect_fault(const char *what, size_t count, const size_t *starts, c
   T_CHECK(ok, "%s (%zu points)", what, total);
 }
 
+/* Edges that run there and back bound nothing, whatever hangs at their other end. */
+static void test_there_and_back(void) {
+  const struct {
+    const char *what;
+    size_t count;
+    double points[24][2];
+    size_t loops;
+    double area;
+  } cases[] = {
+      {"a hole tied to its outer loop",
+       10,
+       {{0, 0}, {9, 0}, {9, 9}, {0, 9}, {0, 0}, {3, 3}, {3, 6}, {6, 6}, {6, 3}, {3, 3}},
+       2,
+       81 - 9},
+      {"the same, turned the same way",
+       10,
+       {{0, 0}, {9, 0}, {9, 9}, {0, 9}, {0, 0}, {3, 3}, {6, 3}, {6, 6}, {3, 6}, {3, 3}},
+       2,
+       81 - 9},
+      {"a tie of three edges",
+       14,
+       {{0, 0},
+        {9, 0},
+        {9, 9},
+        {0, 9},
+        {0, 0},
+        {1, 2},
+        {2, 2},
+        {3, 3},
+        {3, 6},
+        {6, 6},
+        {6, 3},
+        {3, 3},
+        {2, 2},
+        {1, 2}},
+       2,
+       81 - 9},
+      {"two holes at one vertex, an island tied to one",
+       20,
+       {{0, 0}, {9, 0}, {9, 9}, {0, 9}, {0, 0}, {1, 3}, {1, 8}, {6, 8}, {6, 3}, {1, 3},
+        {2, 4}, {3, 4}, {3, 5}, {2, 4}, {1, 3}, {0, 0}, {4, 1}, {8, 1}, {8, 2}, {4, 1}},
+       4,
+       81 - 25 + 0.5 - 2},
+      {"spikes, one of them at the first point", 7, {{5, 5}, {0, 0}, {4, 0}, {4, 4}, {7, 4}, {4, 4}, {0, 0}}, 1, 8},
+      {"a line there and back", 4, {{0, 0}, {1, 0}, {2, 1}, {1, 0}}, 0, 0},
+  };
+  for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
+    const size_t n = cases[c].count;
+    bool ok = true;
+    for (size_t way = 0; way < 2 * n; way++) {
+      double points[24][2];
+      for (size_t i = 0; i < n; i++) {
+        size_t j = (way / 2 + i) % n;
+        memcpy(points[i], cases[c].points[way % 2 ? n - 1 - j : j], sizeof *points);
+      }
+      polygon_set p = {.ctx = ctx};
+      polygon_fault fault = {POLYGON_SOUND, {0, 0}, {0, 0}, {0, 0}};
+      unsigned char dropped = 2;
+      batten_status st = polygon_set_make(ctx, 1, (const size_t[]){0, n}, points[0], 1e-9, &p, &dropped, &fault);
+      ok = ok && st == BATTEN_OK && p.count == cases[c].loops && fabs(p.area - cases[c].area) < 1e-12 &&
+           dropped == (cases[c].loops == 0);
+      for (size_t k = 0; st == BATTEN_OK && k < p.count; k++) ok = ok && p.given[k] == 0;
+      if (!ok) printf("# way %zu: %s, %zu loops, area %g\n", way, batten_status_name(st), p.count, p.area);
+      if (st == BATTEN_OK) polygon_set_free(&p);
+      if (!ok) break;
+    }
+    T_CHECK(ok, "%s: %zu loops, area %g", cases[c].what, cases[c].loops, cases[c].area);
+  }
+}
+
 static void test_crossings(void) {
   const double bow[] = {0, 0, 2, 2, 2, 0, 0, 2};
   expect_fault("a bow crosses itself", 1, (const size_t[]){0, 4}, bow, true, 0, 0, 0, 2);
@@ -329,6 +399,7 @@ static batten_status make_and_free(batten_context *c, void *arg) {
 int main(void) {
   ctx = t_context(NULL, NULL, 1);
   test_nest();
+  test_there_and_back();
   test_crossings();
   test_drop();
   test_distance();
