@@ -3,9 +3,10 @@
  * Even-odd and the exact distance to the polygons are the oracle; nothing of how the function was made is used.
  *
  *   sign   at a grid of 64 cells along the longest side, moved by a part of a cell that no other grid in this folder
- *          has, at places on both sides of the loops twice as dense as their vertices and one tolerance to sixteen
- *          off them, and on circles from 2 to 100 half diagonals away: where F and the distance oppose, the distance
- * is the depth. miss   |F| / |grad F| at the vertices of the loops. */
+ *          has, at places on both sides of the loops - twice as dense as their vertices and no farther apart than
+ * five tolerances, just above one tolerance off, two, four, and so on to a cell -, and on circles from 2 to 100 half
+ * diagonals away: where F and the distance oppose, the distance is the depth miss   |F| / |grad F| at the vertices of
+ * the loops */
 #include "base/checked.h"
 #include "section/places.h"
 #include "section/section_inner.h"
@@ -15,7 +16,8 @@
 enum { CELLS = 64, CIRCLES = 4, DIRECTIONS = 64 };
 static const double SHIFT = 0.381966;                 /* of a cell */
 static const double RADII[CIRCLES] = {2, 6, 25, 100}; /* half diagonals */
-static const double STEP = 0.5;                       /* of an edge */
+static const double STEP = 0.5, STEP_MAX = 5;         /* of an edge, of a tolerance */
+static const double NEAR = 1.001;                     /* tolerances: deep enough not to pass when it is wrong */
 
 /* x [CIRCLES DIRECTIONS][2] */
 static void far_places(const polygon_set *p, double *x) {
@@ -64,9 +66,9 @@ batten_status section_certify(batten_context *ctx, const polygon_set *loops, con
   loop_places along = {0};
   double *beside = NULL, *far = NULL, depth = 0, miss = 0;
   size_t count = 0;
-  batten_status st = loop_places_make(ctx, loops, STEP, INFINITY, &along);
+  batten_status st = loop_places_make(ctx, loops, STEP, STEP_MAX * tolerance, &along);
   if (st < 0) goto done;
-  st = loop_places_beside(ctx, loops, &along, 1, tolerance, CELLS, SHIFT, &beside, &count);
+  st = loop_places_beside(ctx, loops, &along, NEAR * tolerance, CELLS, SHIFT, &beside, &count);
   if (st < 0) goto done;
   st = BATTEN_E_NOMEM;
   far = batten_alloc_array(ctx, CIRCLES * DIRECTIONS, 2 * sizeof *far);

@@ -52,11 +52,11 @@ static size_t guess_centers(const fit_all *a, const polygon_set *p) {
   return guess < CENTERS_MAX ? (size_t)guess : CENTERS_MAX;
 }
 
-/* Beside the system: grids, and some three places a point, each looked at with ten beside it. */
+/* Beside the system: grids, and some three places a point, each looked at with some twenty beside it. */
 static size_t guess_bytes(const fit_all *a, const polygon_set *p) {
   double places = fmin(3 * factor_of(a, p) * (double)p->starts[p->count], 65536);
   size_t system = batten_spline_bytes(BATTEN_SADDLE_CHOLESKY, 2, 2, guess_centers(a, p), 0), all;
-  return batten_add(system, 1000000 + (size_t)(700 * places), &all) ? all : SIZE_MAX;
+  return batten_add(system, 1000000 + (size_t)(1000 * places), &all) ? all : SIZE_MAX;
 }
 
 static bool has_loops(const fit_all *a, size_t i) { return a->s->sections[i].loops.count > 0; }

@@ -120,22 +120,23 @@ void loop_places_free(batten_context *ctx, loop_places *p) {
   *p = (loop_places){0};
 }
 
-enum { OFFSETS = 5 };
+enum { OFFSETS_LEAST = 4, OFFSETS_MOST = 16 };
 
-batten_status loop_places_beside(batten_context *ctx, const polygon_set *p, const loop_places *along, size_t stretch,
-                                 double near, size_t cells, double shift, double **out, size_t *out_count) {
+batten_status loop_places_beside(batten_context *ctx, const polygon_set *p, const loop_places *along, double near,
+                                 size_t cells, double shift, double **out, size_t *out_count) {
   const double width = p->upper[0] - p->lower[0], height = p->upper[1] - p->lower[1];
   const double margin = 0.25 * hypot(width, height), cell = fmax(width, height) / (double)cells;
   const size_t columns = (size_t)((width + 2 * margin) / cell) + 1, rows = (size_t)((height + 2 * margin) / cell) + 1;
-  const size_t bands = (along->count + stretch - 1) / stretch;
-  double *x = batten_alloc_array(ctx, columns * rows + bands * 2 * OFFSETS, 2 * sizeof *x), *next = x;
+  size_t offsets = OFFSETS_LEAST;
+  while (offsets < OFFSETS_MOST && near * (double)(1u << offsets) < cell) offsets++;
+  double *x = batten_alloc_array(ctx, columns * rows + along->count * 2 * offsets, 2 * sizeof *x), *next = x;
   if (!x) return BATTEN_E_NOMEM;
   for (size_t i = 0; i < columns * rows; i++) {
     *next++ = p->lower[0] - margin + ((double)(i % columns) + shift) * cell;
     *next++ = p->lower[1] - margin + ((double)(i / columns) + shift) * cell;
   }
-  for (size_t i = 0; i < along->count; i += stretch)
-    for (unsigned j = 0; j < 2 * OFFSETS; j++) {
+  for (size_t i = 0; i < along->count; i++)
+    for (size_t j = 0; j < 2 * offsets; j++) {
       double offset = (j % 2 ? -near : near) * (double)(1u << j / 2);
       for (unsigned k = 0; k < 2; k++) *next++ = along->x[2 * i + k] + offset * along->outward[2 * i + k];
     }

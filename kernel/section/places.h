@@ -19,10 +19,11 @@ batten_status loop_places_make(batten_context *ctx, const polygon_set *loops, do
                                loop_places *out);
 void loop_places_free(batten_context *ctx, loop_places *p); /* takes a zeroed struct too */
 
-/* Places off the loops: a grid of square cells, `cells` along the longest side of the box of the loops, beyond which it
- * goes on for half of its half diagonal; and on both sides of every stretch-th place, offset by 1, 2, 4, 8 and 16 times
- * `near`, along the normal. shift in [0, 1) of a cell moves the grid. x [*count][2] is freed by batten_free. */
-batten_status loop_places_beside(batten_context *ctx, const polygon_set *loops, const loop_places *along,
-                                 size_t stretch, double near, size_t cells, double shift, double **x, size_t *count);
+/* Places off the loops: a grid of square cells, `cells` along the longest side of the box of the loops, beyond which
+ * it goes on for half of its half diagonal; and on both sides of every place, offset along the normal by 1, 2, 4, 8
+ * times `near`, and so on up to a cell, where the grid takes over. shift in [0, 1) of a cell moves the grid. x
+ * [*count][2] is freed by batten_free. */
+batten_status loop_places_beside(batten_context *ctx, const polygon_set *loops, const loop_places *along, double near,
+                                 size_t cells, double shift, double **x, size_t *count);
 
 #endif

@@ -70,7 +70,7 @@ batten_status batten_section_fit(batten_context *ctx, const batten_section *sect
   if (st >= 0) st = stack_check_options(ctx, 1, &options);
   if (st >= 0) st = stack_take_sections(ctx, 1, &flat, &options, &s, &notes);
   if (st < 0) goto done;
-  const double tolerance = options.tolerance > 0 ? options.tolerance : 0.1 * s.spacing, taken = batten_now();
+  const double tolerance = stack_tolerance(&s, &options), taken = batten_now();
   st = stack_fit_all(ctx, &s, &flat, &options, tolerance, &figures);
   if (st < 0) goto done;
   if (info) {

@@ -25,6 +25,7 @@ enum {
   ROUND_MOST = 40,   /* new places of a round, or a quarter of those there are */
   ROUNDS = 40,       /* 3 to 7 are usual */
   SIGN_ROUNDS = 8,
+  CENTERS_MAX = 6000, /* of all: seconds and 150 MB; what is missed then, the proof tells */
   FAR = 16,
   SIGN_CELLS = 48
 };
@@ -80,6 +81,8 @@ static bool meets_another(const section_fit *s, const double *x, double distance
   return false;
 }
 
+static bool is_full(const section_fit *s) { return s->count + 3 > CENTERS_MAX; }
+
 /* Room is there. */
 static void add(section_fit *s, const double *x, double value) {
   memcpy(s->points + 2 * s->count, x, 2 * sizeof *x);
@@ -133,7 +136,7 @@ static batten_status add_first(section_fit *s) {
     size_t wanted = count / START_STRIDE > START_LEAST ? count / START_STRIDE : START_LEAST;
     if (wanted > START_MOST) wanted = START_MOST;
     if (wanted > count) wanted = count;
-    for (size_t j = 0; st >= 0 && j < wanted; j++)
+    for (size_t j = 0; st >= 0 && j < wanted && (j < START_LEAST || !is_full(s)); j++)
       st = add_place(s, first + j * (count / wanted) + j * (count % wanted) / wanted);
   }
   return st;
@@ -196,7 +199,7 @@ static batten_status add_worst(section_fit *s, size_t *added) {
     if (s->misses[i] > s->tolerance) s->candidates[count++] = (candidate){s->misses[i], i};
   if (count == 0) return BATTEN_OK;
   qsort(s->candidates, count, sizeof *s->candidates, compare_candidates);
-  for (size_t c = 0; c < count && *added < most; c++) {
+  for (size_t c = 0; c < count && *added < most && !is_full(s); c++) {
     const size_t i = s->candidates[c].at;
     const double apart = fmin(APART * s->places.edge[s->loop[i]], APART_MAX * s->tolerance);
     bool free = true;
@@ -240,7 +243,7 @@ static batten_status add_wrong_signs(section_fit *s, size_t count, const double 
   }
   qsort(wrong, found, sizeof *wrong, compare_candidates);
   if ((st = reserve(s, ROUND_MOST)) < 0) goto done;
-  for (size_t c = 0; c < found && *added < ROUND_MOST; c++) {
+  for (size_t c = 0; c < found && *added < ROUND_MOST && !is_full(s); c++) {
     const double *at = x + 2 * wrong[c].at;
     if (meets_another(s, at, 0.5 * wrong[c].miss)) continue; /* that one speaks for this place too */
     add(s, at, polygon_distance(s->loops, at, NULL, NULL));
@@ -255,8 +258,8 @@ done:
 static batten_status follow_signs(section_fit *s) {
   double *x = NULL;
   size_t count, added;
-  batten_status st = loop_places_beside(s->ctx, s->loops, &s->places, 1, SIGN_NEAR * s->tolerance, SIGN_CELLS,
-                                        SIGN_SHIFT, &x, &count);
+  batten_status st =
+      loop_places_beside(s->ctx, s->loops, &s->places, SIGN_NEAR * s->tolerance, SIGN_CELLS, SIGN_SHIFT, &x, &count);
   for (int round = 0; st >= 0 && round < SIGN_ROUNDS; round++) {
     st = add_wrong_signs(s, count, x, &added);
     if (st < 0 || added == 0) break;

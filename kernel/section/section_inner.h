@@ -93,6 +93,8 @@ batten_status stack_check_options(batten_context *ctx, size_t count, const batte
  * points [starts..] are for the fit to read from the caller's sections. */
 batten_status stack_take_sections(batten_context *ctx, size_t count, const batten_section *sections,
                                   const batten_stack_options *opt, stack *out, stack_notes *notes);
+/* How far curves may miss: as given, or what stands for 0; after stack_take_sections. */
+double stack_tolerance(const stack *s, const batten_stack_options *opt);
 void stack_release(stack *s); /* all that hangs on it, not s itself (release.c) */
 
 /* ---- section_fit.c, fit_all.c, certify.c ---------------------------------------------------------- */
@@ -128,14 +130,14 @@ batten_status stack_fit_all(batten_context *ctx, stack *s, const batten_section 
  * say LINKED; non_overlaps counts these sides too. */
 batten_status stack_find_components(batten_context *ctx, stack *s, bool link, stack_notes *notes, size_t *pieces,
                                     size_t *non_overlaps);
-/* What the links of section `at` (between it and the next) add at places [count][2] of the stack with u = (t - t_at) /
- * (t_next - t_at) in [0, 1]: values becomes max(values, links), gradients [count][3] (d/dx, d/dy, d/du) likewise; may
- * be NULL. On the planes themselves, u = 0 and u = 1, nothing is changed: links are never above the scaled, saturated
- * F_at and F_next there. */
+/* What the links of section `at` (between it and the next) add at places [count][2] of the stack with u = (t - t_at)
+ * / (t_next - t_at) in [0, 1]: values becomes max(values, links), gradients [count][3] (d/dx, d/dy, d/du) likewise;
+ * may be NULL. On the planes themselves, u = 0 and u = 1, nothing is changed: links are never above the scaled,
+ * saturated F_at and F_next there. */
 batten_status stack_link_evaluate(const stack *s, batten_context *ctx, size_t at, size_t count, const double *places,
                                   const double *u, double *values, double *gradients);
-/* Bounds of it over boxes [count][2][3] (x, y, u; u may go beyond [0, 1], where there are no links): ranges [count][2]
- * of the values without links become those with them. */
+/* Bounds of it over boxes [count][2][3] (x, y, u; u may go beyond [0, 1], where there are no links): ranges
+ * [count][2] of the values without links become those with them. */
 batten_status stack_link_bounds(const stack *s, batten_context *ctx, size_t at, size_t count, const double *boxes,
                                 double *ranges);
 /* Pairs of sections whose planes cross in a line of which a part lies in the convex hulls of both: notes CROSSING,

@@ -317,7 +317,7 @@ batten_status batten_stack_build(batten_context *ctx, size_t count, const batten
   if (st < 0) goto done;
   t->method = o.method;
   close_apexes(&t->s);
-  f.tolerance = o.tolerance > 0 ? o.tolerance : 0.1 * t->s.spacing;
+  f.tolerance = stack_tolerance(&t->s, &o);
   f.contours_dropped = told.count;
   worst = st = fit_sections(ctx, t, sections, &o, &f, &told);
   if (st < 0) goto done;

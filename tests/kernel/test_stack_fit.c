@@ -239,6 +239,71 @@ static void test_proof(batten_context *ctx) {
   stack_scene_free(&scene);
 }
 
+/* A small phantom between the places next to the loops and those of the grid: a hole that the loops do not have. */
+static void test_phantom(batten_context *ctx) {
+  stack_scene scene = {0};
+  const double radius = 10;
+  stack_scene_discs(&scene, 1, &radius, 1, 2000);
+  stack_scene_disc(&scene, 9.85 * cos(1), 9.85 * sin(1), 0.05, 20);
+  stack_scene_discs(&scene, 1, &radius, 1, 2000);
+  stack s = make_stack(ctx, &scene);
+  section_figures figures = {0};
+  batten_solid *function = NULL;
+  const double tolerance = 0.1 * s.sections[1].loops.spacing;
+  T_CHECK(section_fit_loops(ctx, &s.sections[0].loops, tolerance, 0.75, &function, &figures) >= 0, "%s",
+          batten_error(ctx));
+  T_OK(section_certify(ctx, &s.sections[0].loops, function, tolerance, &figures), ctx);
+  T_CHECK(figures.certified, "a disc with a hole near its edge: wrong sign %.3g", figures.wrong_sign_max);
+  T_OK(section_certify(ctx, &s.sections[1].loops, function, tolerance, &figures), ctx);
+  T_CHECK(!figures.certified && figures.wrong_sign_max > 0.1 && figures.wrong_sign_max <= 0.2,
+          "the same is no disc: wrong sign %.3g, a grid has cells of %.3g", figures.wrong_sign_max, 20.0 / 64);
+  batten_solid_free(function);
+  free_stack(&s);
+  stack_scene_free(&scene);
+}
+
+/* A function that misses by a little more than the tolerance all along long edges, which have no vertices. */
+static void test_miss(batten_context *ctx) {
+  stack_scene scene = {0};
+  stack_scene_slice(&scene, 0);
+  stack_scene_rectangle(&scene, 10, 10, 1);
+  fitted f = fit_first(ctx, &scene, 0.0005); /* 0.01 */
+  section_figures figures = {0};
+  T_OK(section_certify(ctx, &f.s.sections[0].loops, f.s.sections[0].function, f.tolerance, &figures), ctx);
+  T_CHECK(figures.certified, "a square of four points: wrong sign %.3g, tolerance %.3g", figures.wrong_sign_max,
+          f.tolerance);
+  stack_scene larger = {0};
+  stack_scene_slice(&larger, 0);
+  stack_scene_polygon(&larger, 12, (const double[]){-10, -10, 3, -10, 3.05, -10.03, 3.1, -10.03, 3.15, -10, 10,  -10,
+                                                    10,  10,  3, 10,  2,    10,     1,   10,     -10,  10,  -10, 9},
+                      1);
+  stack s = make_stack(ctx, &larger);
+  T_OK(section_certify(ctx, &s.sections[0].loops, f.s.sections[0].function, 0.012, &figures), ctx);
+  T_CHECK(!figures.certified, "a bump of 0.03 by 0.1 is missed: wrong sign %.3g", figures.wrong_sign_max);
+  T_OK(section_certify(ctx, &f.s.sections[0].loops, f.s.sections[0].function, 0.012, &figures), ctx);
+  T_CHECK(figures.certified, "the square within 0.012: wrong sign %.3g", figures.wrong_sign_max);
+  free_stack(&s);
+  free_stack(&f.s);
+  stack_scene_free(&larger);
+  stack_scene_free(&scene);
+}
+
+/* Dense points in one place do not ask for as many all along the edges of a loop of four. */
+static void test_coarse_and_dense(batten_context *ctx) {
+  stack_scene scene = {0};
+  stack_scene_slice(&scene, 0);
+  stack_scene_rectangle(&scene, 50, 50, 1);
+  stack_scene_disc(&scene, 0, 0, 1, 2000);
+  batten_solid *solid = NULL;
+  batten_stack_info info;
+  T_OK(batten_section_fit(ctx, stack_scene_sections(&scene), NULL, &solid, &info), ctx);
+  T_RATIO(fabs(info.tolerance - 1e-4 * hypot(100, 100)), 1e-12, "tolerance %.4g, spacing %.3g", info.tolerance,
+          info.spacing);
+  T_CHECK(info.certified == 1 && info.centers < 1500, "%zu centres in %.2f s", info.centers, info.time_fit_s);
+  batten_solid_free(solid);
+  stack_scene_free(&scene);
+}
+
 /* ---- points in no order ---------------------------------------------------------------------------- */
 
 static void test_points(batten_context *ctx) {
@@ -410,6 +475,9 @@ int main(void) {
   test_random(ctx);
   test_invariance(ctx);
   test_proof(ctx);
+  test_phantom(ctx);
+  test_miss(ctx);
+  test_coarse_and_dense(ctx);
   test_points(ctx);
   test_heart(ctx);
   T_CHECK(batten_bytes_in_use(ctx) == 0, "nothing held");
