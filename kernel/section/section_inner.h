@@ -143,10 +143,11 @@ batten_status stack_link_bounds(const stack *s, batten_context *ctx, size_t at, 
 /* Pairs of sections whose planes cross in a line of which a part lies in the convex hulls of both: notes CROSSING,
  * section before other, contour SIZE_MAX. */
 batten_status stack_find_crossings(batten_context *ctx, const stack *s, stack_notes *notes, size_t *crossings);
-/* One solid in space through the centres of all sections' functions, which must be there; pair_distance is for
- * sections of points in no order. Returns BATTEN_W_ACCURACY as batten_spline_fit. */
-batten_status stack_fit_space(batten_context *ctx, const stack *s, double pair_distance, batten_solid **out,
-                              size_t *centers);
+/* One solid in space through the centres of all sections' functions, which must be there. ordered: the points were
+ * contours; else their loops, if any, were traced, and pair_distance says where values stand beside the points.
+ * Returns BATTEN_W_ACCURACY as batten_spline_fit. */
+batten_status stack_fit_space(batten_context *ctx, const stack *s, bool ordered, double pair_distance,
+                              batten_solid **out, size_t *centers);
 
 /* ---- weights.c ------------------------------------------------------------------------------------ */
 

@@ -22,6 +22,7 @@ typedef struct space_fit {
   batten_context *ctx;
   const stack *s;
   double pair_distance;
+  bool ordered;
   size_t capacity, on, count; /* those on the surface come first */
   double *points, *values;    /* [capacity][3], [capacity] of f */
   size_t *section;            /* [capacity] */
@@ -97,8 +98,10 @@ static batten_status open_fit(space_fit *t) {
   size_t room = DIRECTIONS * SHELLS;
   for (size_t i = 0; i < t->s->count; i++) {
     const stack_section *s = &t->s->sections[i];
-    /* of points in no order each may get two beside it */
-    room += s->apex_count ? s->apex_count : (s->loops.count ? 1 : 3) * parts_of(s).count;
+    size_t on = s->apex_count;
+    if (!on) batten_solid_points(s->function, &on); /* a function may have fewer centres than points, or more */
+    room += on;
+    if (!s->apex_count) room += t->ordered ? parts_of(s).count : 2 * on; /* of points in no order: pairs */
   }
   t->capacity = room;
   t->points = batten_alloc_array(t->ctx, room, 3 * sizeof *t->points);
@@ -121,7 +124,7 @@ static batten_status collect(space_fit *t) {
   t->on = t->count;
   for (size_t i = 0; st >= 0 && i < t->s->count; i++) {
     if (t->s->sections[i].apex_count) continue;
-    if (t->s->sections[i].loops.count)
+    if (t->ordered)
       add_off(t, i);
     else
       st = add_pairs(t, i);
@@ -230,9 +233,9 @@ static batten_status fit_spline(space_fit *t, batten_solid **out) {
   return made < 0 ? made : st;
 }
 
-batten_status stack_fit_space(batten_context *ctx, const stack *s, double pair_distance, batten_solid **out,
-                              size_t *centers) {
-  space_fit t = {.ctx = ctx, .s = s, .pair_distance = pair_distance};
+batten_status stack_fit_space(batten_context *ctx, const stack *s, bool ordered, double pair_distance,
+                              batten_solid **out, size_t *centers) {
+  space_fit t = {.ctx = ctx, .s = s, .ordered = ordered, .pair_distance = pair_distance};
   batten_status st = open_fit(&t);
   if (st >= 0) st = collect(&t);
   if (st >= 0) st = drop_meeting(&t);

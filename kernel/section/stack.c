@@ -327,7 +327,8 @@ batten_status batten_stack_build(batten_context *ctx, size_t count, const batten
   f.route = o.route;
   if (o.route == BATTEN_ROUTE_AUTO)
     f.route = f.crossings && !has_sequence(&t->s) ? BATTEN_ROUTE_SPACE : BATTEN_ROUTE_SECTIONS;
-  st = f.route == BATTEN_ROUTE_SPACE ? stack_fit_space(ctx, &t->s, o.pair_distance, &solid, &f.centers)
+  bool ordered = o.method == BATTEN_SECTION_PAIRS;
+  st = f.route == BATTEN_ROUTE_SPACE ? stack_fit_space(ctx, &t->s, ordered, o.pair_distance, &solid, &f.centers)
                                      : join_sections(ctx, t, &o, &f, &told, &solid);
   if (st > 0 && worst == BATTEN_OK) worst = st;
   if (st < 0) goto done;
