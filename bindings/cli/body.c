@@ -71,14 +71,21 @@ void body_note(body *b, batten_status st) {
   if (b->status == BATTEN_OK) b->status = st;
 }
 
-/* A tree's box is tight; a margin of a quarter, as around points, would only be searched in vain. */
-static void widen_box(body *b, unsigned n) {
+/* Cut where the command line says, else around all of the solid: sections' ends reach beyond their points, the only
+ * ones that the polygoniser knows of. A tree's box is tight; as large a margin would only be searched in vain. */
+static void choose_box(body *b, unsigned n) {
   batten_polygonize_options *o = &b->request->surface;
-  if (b->request->box) return;
+  batten_solid_kind kind = batten_solid_kind_of(b->solid);
+  double margin = 0;
+  if (kind == BATTEN_SOLID_SPLINE) return;
+  for (unsigned k = 0; k < n; k++)
+    if (o->lower[k] < o->upper[k]) return;
   batten_solid_box(b->solid, o->lower, o->upper);
+  for (unsigned k = 0; k < n; k++) margin = fmax(margin, 0.25 * (o->upper[k] - o->lower[k]));
+  if (kind == BATTEN_SOLID_TREE) margin = 2 * o->cell;
   for (unsigned k = 0; k < n; k++) {
-    o->lower[k] -= 2 * o->cell;
-    o->upper[k] += 2 * o->cell;
+    o->lower[k] -= margin;
+    o->upper[k] += margin;
   }
 }
 
@@ -90,7 +97,7 @@ batten_status body_mesh(body *b, double cell) {
   size_t count;
   const double *seeds = batten_solid_points(b->solid, &count);
   if (o->cell == 0) o->cell = cell;
-  if (batten_solid_kind_of(b->solid) == BATTEN_SOLID_TREE) widen_box(b, field.dimension);
+  choose_box(b, field.dimension);
   batten_status st = field.dimension == 2
                          ? batten_trace_outline(ctx, &field, count, seeds, o, &b->outline, &b->surface)
                          : batten_polygonize(ctx, &field, count, seeds, o, &b->mesh, &b->surface);

@@ -71,7 +71,7 @@ static const cli_option table[] = {
     {"draughts", OPT_DRAUGHTS, "Z,...", "report the volume below these heights"},
     {"cell", BODY_KEY_CELL, "LENGTH",
      "edge length of the mesh; default from the points' spacing, but at most\n1/120 of the diagonal of their box"},
-    BODY_OPTION_BOX("the sections' box grown by 25 %"),
+    BODY_OPTION_BOX("the solid's box grown by 25 %"),
     BODY_OPTION_COLOR,
     {"dots", BODY_KEY_DOTS, NULL, "draw the contours' points in the picture"},
     CLI_OPTION_VIEW,

@@ -109,6 +109,12 @@ polygon 0 0 0 5 40 >single.txt
 run 0 "" stack single.txt --gap 4 --quiet --report disc.json
 holds disc.json volume 'x > 0.985 * 4 * 78.54 && x < 1.015 * 4 * 78.54'
 
+# Half a gap beyond the points is more than a quarter of their box.
+{ polygon 0 0 0 1 40; polygon 0 0 4 1 40; } >far_ends.txt
+run 0 "" stack far_ends.txt --quiet --report far_ends.json
+is far_ends.json status ok
+holds far_ends.json volume 'x > 0.985 * 8 * 3.14159 && x < 1.015 * 8 * 3.14159'
+
 # ---- options ------------------------------------------------------------------------------------
 
 for between in natural not-a-knot monotone linear rational; do
