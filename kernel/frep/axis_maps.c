@@ -33,15 +33,31 @@ static interval turned_range(interval u, interval v, interval t) {
   return interval_widen(hull.lo - 1e-15 * size, hull.hi + 1e-15 * size, 8);
 }
 
-static unsigned twist_images(const batten_frep *a, const interval *x, frep_image *image) {
+/* A box that turns far off the axis is looked at in arcs: the hull of all of them would hold what lies about the axis
+ * too. */
+static unsigned twist_images(const batten_frep *a, const interval *x, frep_image *images) {
+  static const double sixth = 1.0471975511965976, turn = 6.2831853071795865;
   const twist_state *s = a->state;
   interval q[3];
   frep_frame_into_range(&s->frame, x, q);
-  interval angle = interval_scale(q[2], s->rate);
-  const interval psi[3] = {turned_range(q[0], q[1], angle), turned_range(q[1], interval_neg(q[0]), angle), q[2]};
-  double radius = interval_hypot(q[0], q[1]).hi;
-  *image = frep_frame_image(&s->frame, psi, 1 + fabs(s->rate) * radius);
-  return 1;
+  const interval radius = interval_hypot(q[0], q[1]);
+  const double width = fabs(s->rate) * (q[2].hi - q[2].lo);
+  const bool around = !(width < turn);
+  const unsigned most = radius.lo > radius.hi / 2 ? FREP_IMAGES : 1;
+  const unsigned arcs = around ? most : (unsigned)fmin(1 + width / sixth, most);
+  for (unsigned i = 0; i < arcs; i++) {
+    const double from = (double)i / arcs, to = (double)(i + 1) / arcs;
+    interval z = q[2], angle = interval_widen(turn * from, turn * to, 4);
+    if (!around) {
+      if (i > 0) z.lo = (1 - from) * q[2].lo + from * q[2].hi;
+      if (i + 1 < arcs) z.hi = (1 - to) * q[2].lo + to * q[2].hi;
+      angle = interval_scale(z, s->rate);
+    }
+    const interval psi[3] = {turned_range(q[0], q[1], angle), turned_range(q[1], interval_neg(q[0]), angle), z};
+    images[i] = frep_frame_image(&s->frame, psi, 1 + fabs(s->rate) * radius.hi);
+    images[i].group = 1;
+  }
+  return arcs;
 }
 
 static batten_status twist_evaluate(const batten_frep *a, batten_context *ctx, size_t count, const double *points,

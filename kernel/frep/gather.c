@@ -257,7 +257,7 @@ batten_status frep_map_bounds(const batten_frep *a, batten_context *ctx, frep_im
   for (size_t i = 0; st >= 0 && i < count; i++) {
     interval x[3];
     frep_box_intervals(a->n, boxes + i * 2 * a->n, x);
-    frep_image images[FREP_PLACES];
+    frep_image images[FREP_IMAGES];
     unsigned made = images_of(a, x, images);
     for (unsigned k = 0; st >= 0 && k < made; k++) st = frep_gather_image(g, i, images + k);
   }

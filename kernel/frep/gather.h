@@ -9,7 +9,7 @@
 
 #include "frep/frep_inner.h"
 
-enum { FREP_PLACES = 3 }; /* most places of a map */
+enum { FREP_PLACES = 3, FREP_IMAGES = 6 /* most of a map, of a point and of a box */ };
 
 typedef struct frep_place {
   double y[3];
@@ -42,7 +42,7 @@ batten_status frep_gather_boxes(batten_context *ctx, const batten_frep *a, size_
                                 double *slopes, frep_gather **out);
 batten_status frep_gather_image(frep_gather *g, size_t box, const frep_image *image);
 
-/* Maps: the places of a point and the images of a box, at most FREP_PLACES; they return how many. */
+/* Maps: the places of a point and the images of a box; they return how many. */
 typedef unsigned (*frep_places_of)(const batten_frep *a, const double *x, frep_place *places);
 typedef unsigned (*frep_images_of)(const batten_frep *a, const interval *x, frep_image *images);
 batten_status frep_map_evaluate(const batten_frep *a, batten_context *ctx, frep_places_of places_of, size_t count,

@@ -156,6 +156,15 @@ static void test_twist(batten_context *ctx) {
   T_OK(batten_frep_twist(ctx, bar, (double[]){0.1, 0.2, -0.1}, (double[]){1, -2, 2}, 0.8, &a), ctx);
   check_all(ctx, "twist about any axis", a, 0.03, 2);
   batten_frep_free(a);
+  /* many turns within a box: what lies beside the twisted bar is known to be outside all the same */
+  T_OK(batten_frep_twist(ctx, bar, (double[]){0, 0, 0}, (double[]){0, 0, 1}, 30, &a), ctx);
+  frep_check_bounds(ctx, "fast twist", a, 1.5, 25600, 21);
+  double range[2];
+  T_OK(batten_frep_bounds(ctx, a, 1, (double[]){1.2, -0.1, -0.9, 1.4, 0.1, 0.9}, range), ctx);
+  T_CHECK(range[1] < 0 && range[0] < range[1], "a box beside a bar of 8 turns is outside: %.3g to %.3g", range[0],
+          range[1]);
+  batten_frep_free(a);
+  a = NULL;
   T_STATUS(batten_frep_twist(ctx, bar, (double[]){0, 0, 0}, (double[]){0, 0, 0}, 1, &a), BATTEN_E_INVALID, ctx,
            "axis: its length is 0");
   T_STATUS(batten_frep_twist(ctx, bar, (double[]){0, 0, 0}, (double[]){0, 0, 1}, INFINITY, &a), BATTEN_E_INVALID, ctx,
