@@ -101,6 +101,21 @@ with tempfile.TemporaryDirectory() as folder:
                              ("a file that is not there", at("none.dcm"), "No such file")):
         status, out, err = run(path, "--list")
         check(f"refuses {name}", status == 1 and text in err and err.count("\n") == 1, err)
+    whole = open(at("a.dcm"), "rb").read()
+    for name, data, arguments in (("a number that is none", whole.replace(b"10.25", b"10x25"), ["--structure", "Body"]),
+                                  ("a number that is not finite", whole.replace(b"10.25", b"  nan"), ["--structure", "4"]),
+                                  ("a file that is cut off", whole[:len(whole) - 100], ["--list"])):
+        with open(at("bad.dcm"), "wb") as file:
+            file.write(data)
+        status, out, err = run(at("bad.dcm"), *arguments)
+        check(f"refuses {name} in one line", status == 1 and "bad.dcm: " in err and err.count("\n") == 1, err)
+    os.unlink(at("bad.dcm"))
+    if os.path.exists("/dev/full"):
+        with open("/dev/full", "w") as full:
+            r = subprocess.run([sys.executable, converter, at("a.dcm"), "--list"], stdout=full, stderr=subprocess.PIPE,
+                               text=True)
+        check("tells in one line that its output cannot be written",
+              r.returncode == 1 and "standard output: " in r.stderr and r.stderr.count("\n") == 1, r.stderr)
     status, out, err = run(at("a.dcm"), "--structure", "Body", "-o", at("none/b.txt"))
     check("refuses a folder that is not there", status == 1 and "No such file" in err, err)
     check("leaves nothing behind", sorted(os.listdir(folder)) == ["a.dcm", "b.txt.gz", "ct.dcm", "ring.txt"],
