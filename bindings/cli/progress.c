@@ -117,7 +117,7 @@ static bool about_input(const char *own) {
   static const char *const words[] = {"points",        "matrix",   "seeds",      "problem",        "edge",
                                       "vert",          "triangle", "mesh",       "opt.parameters", "opt.weights",
                                       "opt.triangles", "count",    "parameters", "contour",        "planes",
-                                      "slice",         "sections", "a: "};
+                                      "slice",         "sections", "a: ",        "field: "};
   for (size_t i = 0; i < sizeof words / sizeof *words; i++)
     if (strncmp(own, words[i], strlen(words[i])) == 0) return true;
   return false;
@@ -182,7 +182,8 @@ void cli_run_text(const cli_run *run, batten_status status, char *text, size_t s
   else {
     head = strlen(input) + 2;
     bool count = strncmp(own, "count: ", 7) == 0, faces = strncmp(own, "triangles: ", 11) == 0;
-    snprintf(text, size, "%s: %s%s", input, faces ? "--faces: " : "", own + (count ? 7 : faces ? 11 : 0));
+    bool tree = strncmp(own, "a: ", 3) == 0; /* the only one that there is */
+    snprintf(text, size, "%s: %s%s", input, faces ? "--faces: " : "", own + (count ? 7 : faces ? 11 : tree ? 3 : 0));
   }
   if (head < strlen(text)) use_words(text + head, size - head);
   for (size_t i = 0; run->outputs && i < run->outputs->count; i++) {

@@ -235,6 +235,22 @@ batten_status bx_get_rows(bx_json *j, const json_t *object, const char *key, siz
   return st;
 }
 
+batten_status bx_check_members(bx_json *j, const json_t *object, const char *what, const char *const *known) {
+  const char *key;
+  json_t *value;
+  json_object_foreach((json_t *)(uintptr_t)object, key, value) {
+    size_t i = 0;
+    while (known[i] && strcmp(known[i], key)) i++;
+    if (known[i] || !strcmp(key, "node")) continue; /* that of a node's kind */
+    char quote[BX_QUOTE_SIZE], list[128] = "";
+    for (size_t k = 0, used = 0; known[k] && used < sizeof list; k++)
+      used += (size_t)snprintf(list + used, sizeof list - used, "%s%s", k ? ", " : "", known[k]);
+    return bx_json_fail(j, "'%s' is no argument of %s, which takes %s", bx_quote(key, strlen(key), quote), what,
+                        *list ? list : "none");
+  }
+  return BATTEN_OK;
+}
+
 batten_status bx_check_head(bx_json *j, const json_t *root, const char *kind) {
   const char *given = "";
   int64_t version;

@@ -44,6 +44,8 @@ batten_status bx_get_numbers(bx_json *j, const json_t *object, const char *key, 
 /* [*rows][width] numbers in memory of the context; width 0: plain numbers, [*rows]. */
 batten_status bx_get_rows(bx_json *j, const json_t *object, const char *key, size_t width, size_t *rows,
                           double **out);
+/* Members that no one reads would be errors of writing that no one sees. what: "a ball"; known: NULL-ended. */
+batten_status bx_check_members(bx_json *j, const json_t *object, const char *what, const char *const *known);
 /* An array of count items. */
 batten_status bx_get_array(bx_json *j, const json_t *object, const char *key, size_t count, json_t **out);
 

@@ -44,15 +44,19 @@ static batten_status load_reference(scene *s, const json_t *value, batten_frep *
 
 /* ---- what the kernel says ---------------------------------------------------------------------------------- */
 
-/* "radius: -1; give ..." at "root.b" becomes "root.b.radius: -1; give ...". */
+/* "radius: -1; give ..." at "root.b" becomes "root.b.radius: -1; give ...". Nodes of a list are `of` in scenes. */
 static batten_status explain(bx_json *j, batten_status st) {
   char text[256];
   if (st >= 0 || st == BATTEN_E_NOMEM || st == BATTEN_E_CANCELLED) return st;
   snprintf(text, sizeof text, "%s", batten_error(j->ctx));
   size_t word = strspn(text, "abcdefghijklmnopqrstuvwxyz_0123456789");
-  bool argument = word > 0 && (text[word] == ':' || text[word] == '[');
+  bool argument = word > 0 && (text[word] == ':' || text[word] == '['), list = !strncmp(text, "nodes[", 6);
   return batten_fail(j->ctx, st == BATTEN_E_INVALID ? BATTEN_E_FORMAT : st, "%s: %s%s%s", bx_short_path(j->path),
-                     j->place, argument ? "." : ": ", text);
+                     j->place,
+                     list       ? ".of"
+                     : argument ? "."
+                                : ": ",
+                     list ? text + 5 : text);
 }
 
 /* ---- kinds ---------------------------------------------------------------------------------------------------- */
@@ -83,23 +87,6 @@ static batten_status fail_kind(bx_json *j, const char *kind) {
   }
   return bx_json_fail(j, "'%s' is no kind of node%s%s; the kinds are listed in files.md",
                       bx_quote(kind, strlen(kind), quote), used ? "; with this letter begin" : "", list);
-}
-
-/* Members that no one reads would be errors of writing that no one sees. known: NULL-ended. */
-static batten_status check_members(bx_json *j, const json_t *object, const char *kind, const char *const *known) {
-  const char *key;
-  json_t *value;
-  json_object_foreach((json_t *)(uintptr_t)object, key, value) {
-    size_t i = 0;
-    while (known[i] && strcmp(known[i], key)) i++;
-    if (known[i] || !strcmp(key, "node")) continue;
-    char quote[BX_QUOTE_SIZE], list[128] = "";
-    for (size_t k = 0, used = 0; known[k] && used < sizeof list; k++)
-      used += (size_t)snprintf(list + used, sizeof list - used, "%s%s", k ? ", " : "", known[k]);
-    return bx_json_fail(j, "'%s' is no argument of %s, which takes %s", bx_quote(key, strlen(key), quote), kind,
-                        *list ? list : "none");
-  }
-  return BATTEN_OK;
 }
 
 /* ---- numbers --------------------------------------------------------------------------------------------------- */
@@ -200,7 +187,9 @@ static batten_status get_member(bx_json *j, const json_t *object, const bx_node_
     case BX_NODE_AXES:
       return get_rows(j, object, key, 3, 2, l);
     case BX_NODE_PATH:
-      return get_rows(j, object, key, 3, SIZE_MAX, l);
+      st = get_rows(j, object, key, 3, SIZE_MAX, l);
+      return st == BATTEN_OK && l->count < 6 ? bx_json_fail(j, "'%s' has fewer than 2 points; give 2 or more", key)
+                                             : st;
     case BX_NODE_PLACES:
       return get_rows(j, object, key, n, i ? l->count / n : SIZE_MAX, l);
     case BX_NODE_CONTOURS:
@@ -225,7 +214,9 @@ static batten_status get_contours(bx_json *j, const json_t *object, number_list 
     size_t inner = bx_enter_item(j, i);
     double *to;
     (*starts)[i] = l->count / 2;
-    st = room_for(l, 2 * json_array_size(contour), &to);
+    if (json_is_array(contour) && json_array_size(contour) < 3)
+      st = bx_json_fail(j, "%zu points; give 3 or more", json_array_size(contour));
+    if (st == BATTEN_OK) st = room_for(l, 2 * json_array_size(contour), &to);
     if (st == BATTEN_OK) st = bx_fill_rows(j, contour, json_array_size(contour), 2, to);
     bx_leave(j, inner);
   }
@@ -268,7 +259,7 @@ static batten_status load_shape(scene *s, const json_t *object, const char *kind
   unsigned n = 0;
   batten_carrier *carrier = NULL;
   for (unsigned i = 0; i < layout->member_count; i++) known[i] = layout->members[i].name;
-  batten_status st = check_members(s->j, object, kind, known);
+  batten_status st = bx_check_members(s->j, object, kind, known);
   if (st == BATTEN_OK) st = tell_dimension(s->j, object, layout->members[0].name, &n);
   if (st == BATTEN_OK) st = bx_load_carrier_members(s->j, object, layout, n, s->depth, &carrier);
   return st == BATTEN_OK ? wrap_carrier(s->j, carrier, out) : st;
@@ -280,7 +271,7 @@ static batten_status load_carrier(scene *s, const json_t *object, batten_frep **
   json_t *value = NULL;
   unsigned n = 3;
   batten_carrier *carrier = NULL;
-  batten_status st = check_members(s->j, object, "carrier", known);
+  batten_status st = bx_check_members(s->j, object, "carrier", known);
   if (st == BATTEN_OK && json_object_get(object, "n")) st = bx_get_dimension(s->j, object, &n);
   if (st == BATTEN_OK) st = bx_get(s->j, object, "carrier", &value);
   if (st != BATTEN_OK) return st;
@@ -317,7 +308,7 @@ static batten_status load_solid(scene *s, const json_t *object, batten_frep **ou
   static const char *const known[] = {"solid", "file", NULL};
   batten_solid *solid = NULL;
   json_t *value = NULL;
-  batten_status st = check_members(s->j, object, "solid", known);
+  batten_status st = bx_check_members(s->j, object, "solid", known);
   if (st != BATTEN_OK) return st;
   if (json_object_get(object, "file")) {
     if (json_object_get(object, "solid")) return bx_json_fail(s->j, "'solid' and 'file' at once; leave out one");
@@ -356,7 +347,7 @@ static batten_status load_many(scene *s, const json_t *object, const char *kind,
   const json_t *items = json_object_get(object, "of");
   size_t count = json_array_size(items), made = 0;
   double alpha = BATTEN_R_SMOOTH;
-  batten_status st = check_members(s->j, object, kind, known);
+  batten_status st = bx_check_members(s->j, object, kind, known);
   if (st == BATTEN_OK && json_object_get(object, "alpha")) st = bx_get_number(s->j, object, "alpha", &alpha);
   if (st == BATTEN_OK && count == 0) st = bx_json_fail(s->j, "'of' must be an array of nodes, one or more");
   if (st != BATTEN_OK) return st;
@@ -392,7 +383,7 @@ static batten_status check_arguments(bx_json *j, const json_t *object, const cha
     count++;
   }
   for (unsigned i = 0; i < layout->member_count; i++) known[count++] = layout->members[i].name;
-  return check_members(j, object, kind, known);
+  return bx_check_members(j, object, kind, known);
 }
 
 static batten_status load_operation(scene *s, const json_t *object, const char *kind, const bx_node_layout *layout,
@@ -511,7 +502,10 @@ static batten_status take_names(scene *s, const json_t *nodes) {
   const char *key;
   json_t *value;
   if (!nodes) return BATTEN_OK;
-  if (!json_is_object(nodes)) return bx_json_fail(s->j, "'nodes' must be an object of nodes by their names");
+  if (!json_is_object(nodes)) {
+    bx_enter(s->j, "nodes");
+    return bx_json_fail(s->j, "it must be an object of nodes by their names");
+  }
   s->list = batten_alloc_array(s->j->ctx, json_object_size(nodes), sizeof *s->list);
   if (!s->list) return BATTEN_E_NOMEM;
   json_object_foreach((json_t *)(uintptr_t)nodes, key, value) {

@@ -67,6 +67,7 @@ batten_status bx_get_section(bx_json *j, const json_t *object, batten_section *o
 }
 
 static batten_status get_sections(bx_json *j, const json_t *root, batten_section_set *out) {
+  static const char *const known[] = {"origin", "rotation", "contours", NULL};
   json_t *array;
   batten_status st = bx_get(j, root, "sections", &array);
   if (st != BATTEN_OK) return st;
@@ -79,7 +80,8 @@ static batten_status get_sections(bx_json *j, const json_t *root, batten_section
     bx_enter_item(j, i);
     out->sections[i] = (batten_section){.contour_count = 0};
     out->count++;
-    st = bx_get_section(j, json_array_get(array, i), &out->sections[i]);
+    st = bx_check_members(j, json_array_get(array, i), "a section", known);
+    if (st == BATTEN_OK) st = bx_get_section(j, json_array_get(array, i), &out->sections[i]);
     bx_leave(j, mark);
     if (st == BATTEN_OK && i % 64 == 0) st = batten_progress(j->ctx, "read", (double)i / (double)count);
   }

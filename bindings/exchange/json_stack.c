@@ -133,7 +133,8 @@ static batten_status get_ends(bx_json *j, const json_t *object, batten_stack_par
     st = bx_get(j, object, keys[i], &end);
     if (st != BATTEN_OK) return st;
     size_t mark = bx_enter(j, keys[i]);
-    st = bx_get_choice(j, end, "end", COUNT_OF(end_rules), end_rules, &rule);
+    if (!json_is_object(end)) st = bx_json_fail(j, "it must be an object {\"end\": RULE, \"length\": ...}");
+    if (st == BATTEN_OK) st = bx_get_choice(j, end, "end", COUNT_OF(end_rules), end_rules, &rule);
     p->ends[i] = (batten_stack_end)rule;
     if (st == BATTEN_OK && json_object_get(end, "length")) st = bx_get_number(j, end, "length", &p->end_lengths[i]);
     bx_leave(j, mark);

@@ -63,6 +63,8 @@ scene "\"root\": {\"node\": \"negation\", \"a\": $ball}" >unbounded.json
 run 1 "unbounded.json: " frep unbounded.json
 grep -q -- "--box" err
 ok $? "and says what to give: $(cat err)"
+grep -q "a: the solid" err
+ok $((!$?)) "and does not name an argument of the library's"
 scene "\"root\": {\"node\": \"offset\", \"distance\": -2, \"a\": $ball}" >empty.json
 run 1 "empty.json: " frep empty.json
 rm -f cycle.json unknown.json kind.json radius.json missing.json alpha.json file.json unbounded.json empty.json

@@ -362,8 +362,19 @@ static void test_refused(batten_context *ctx, scratch *s) {
        "{\"node\": \"union\", \"a\": \"b\", \"b\": {\"node\": \"ball\", \"center\": [0, 0], \"radius\": 1}}",
        "a.json: root.b: "},
       {"", "{\"node\": \"polygon\", \"contours\": []}", "a.json: root.contours: it must be an array of contours"},
-      {"", "{\"node\": \"polygon\", \"contours\": [[[0, 0], [1]]]}",
+      {"", "{\"node\": \"polygon\", \"contours\": [[[0, 0], [1], [0, 1]]]}",
        "a.json: root.contours[0][1]: 1 numbers, where 2 are expected"},
+      {"", "{\"node\": \"polygon\", \"contours\": [[[0, 0], [1, 0], [0, 1]], []]}",
+       "a.json: root.contours[1]: 0 points; give 3 or more"},
+      {"", "{\"node\": \"polygon\", \"contours\": [5]}", "a.json: root.contours[0]: a number, where an array"},
+      {"\"b\": {\"node\": \"ball\", \"center\": [0, 0, 0], \"radius\": 1}",
+       "{\"node\": \"sweep\", \"a\": \"b\", \"path\": [[0, 0, 0]]}",
+       "a.json: root: 'path' has fewer than 2 points; give 2 or more"},
+      {"\"b\": {\"node\": \"ball\", \"center\": [0, 0, 0], \"radius\": 1}",
+       "{\"node\": \"union\", \"of\": [\"b\", {\"node\": \"ball\", \"center\": [0, 0], \"radius\": 1}]}",
+       "a.json: root.of[1]: of another dimension"},
+      {"", "{\"node\": \"solid\", \"solid\": {\"kind\": \"stack\", \"below\": \"open\", \"above\": {}}}",
+       "a.json: root.solid.below: it must be an object {"},
       {"", "{\"node\": \"solid\", \"file\": \"a.json\"}", "a.json: root: files stand in scenes alone"},
       {"", "{\"node\": \"solid\"}", "a.json: root: 'solid' is missing"},
       {"", "{\"node\": \"solid\", \"solid\": {\"kind\": \"stone\"}}",
@@ -378,6 +389,8 @@ static void test_refused(batten_context *ctx, scratch *s) {
     T_STATUS(load_root(ctx, cases[i].nodes, cases[i].root, &tree), BATTEN_E_FORMAT, ctx, cases[i].error);
     T_CHECK(!tree, "case %zu: nothing is handed out", i);
   }
+  T_STATUS(load_text(ctx, "{\"batten\": \"frep\", \"version\": 1, \"nodes\": [], \"root\": \"a\"}", &tree),
+           BATTEN_E_FORMAT, ctx, "a.json: nodes: it must be an object of nodes by their names");
   T_STATUS(load_text(ctx, "{\"batten\": \"frep\", \"version\": 1}", &tree), BATTEN_E_FORMAT, ctx,
            "a.json: document: 'root' is missing");
   T_STATUS(load_text(ctx, "{\"batten\": \"solid\", \"version\": 1}", &tree), BATTEN_E_FORMAT, ctx,

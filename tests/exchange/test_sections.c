@@ -347,6 +347,11 @@ static void test_refused(batten_context *ctx) {
        "{\"batten\": \"sections\", \"version\": 1, \"sections\": [{\"origin\": [0, 0, 0], \"rotation\": [[1, 0, 0]], "
        "\"contours\": []}]}",
        "a.json: document.sections[0].rotation: 1 items, where 3 are expected"},
+      {"a.json",
+       "{\"batten\": \"sections\", \"version\": 1, \"sections\": [{\"origin\": [0, 0, 0], \"rotatoin\": [[1, 0, 0]], "
+       "\"contours\": []}]}",
+       "a.json: document.sections[0]: 'rotatoin' is no argument of a section, which takes origin, rotation, "
+       "contours"},
   };
   batten_section_set s = {0};
   for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
