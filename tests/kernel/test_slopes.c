@@ -233,7 +233,7 @@ static void check_normalized(batten_context *ctx, batten_solid *s, size_t count,
   T_OK(batten_frep_solid(ctx, s, &leaf), ctx);
   T_OK(batten_frep_normalize(ctx, leaf, &a), ctx);
   for (int i = 0; i < 600; i++) {
-    double box[6], range[2], x[3], f, h = (double[]){0.04, 0.02, 0.01}[i % 3];
+    double box[6], range[2], x[3], f = NAN, h = (double[]){0.04, 0.02, 0.01}[i % 3];
     size_t at = t_random(&seed) % count;
     for (size_t k = 0; k < 3; k++) {
       double middle = points[3 * at + k] + 0.2 * (t_uniform(&seed) - 0.5);

@@ -77,8 +77,8 @@ BATTEN_API batten_status batten_frep_blend(batten_context *ctx, batten_frep_oper
  * none): f / |grad f|, the distance to the surface to first order near it, but never beyond L. What offset and shell
  * put below f unless the node is a distance already (leaves that say so, and what moves, mirrors, offsets, unites,
  * intersects (alpha = 1) or negates them), or normalized. The gradient takes two more gradients of f. Bounds are
- * narrow only where the slope of f is bounded too, which it is not for reconstructed solids: there they tell the
- * sign alone. Making one looks for the box of the node (batten_frep_box). */
+ * narrow only where the slope of f is bounded too, which it is not for stacks: there they tell the sign alone. Making
+ * one looks for the box of the node, roughly. */
 BATTEN_API batten_status batten_frep_normalize(batten_context *ctx, batten_frep *a, batten_frep **out);
 /* Is |f| at most the distance to the surface, and equal to it near the surface? Known by construction. */
 BATTEN_API int batten_frep_is_distance(const batten_frep *a);
@@ -163,9 +163,9 @@ BATTEN_API batten_status batten_frep_bounds(batten_context *ctx, const batten_fr
 BATTEN_API batten_field batten_frep_field(const batten_frep *a); /* order 1, with bounds; valid as long as the node */
 /* A finite box [n] each that holds the solid f >= 0, wider than it by 0.4 to about 1 % of its largest extent on each
  * side (more where bounds are wide), found by bounds within what the structure tells: for reconstructed solids the
- * box of the data and half its diagonal, for offsets, shells and blends of what is no distance 4 times as much as for a
- * distance. Progress phase "box". NOT_FOUND: no end was found (a half-space, a negation), or the solid is empty: the
- * text says which. */
+ * box of the data and a quarter of its diagonal, for offsets, shells and blends of what is no distance 4 times as
+ * much as for a distance. Progress phase "box". NOT_FOUND: no end was found (a half-space, a negation), or the solid
+ * is empty: the text says which. */
 BATTEN_API batten_status batten_frep_box(batten_context *ctx, const batten_frep *a, double *lower, double *upper);
 /* The tree as a solid: mesh, save, carrier of others. lower, upper [n]: the box in which its surface is looked for;
  * both NULL = batten_frep_box. cell: how fine, for the points on its surface; 0 = 1/60 of the diagonal. NOT_FOUND: no
