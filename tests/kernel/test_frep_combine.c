@@ -134,6 +134,13 @@ static void test_morph(batten_context *ctx) {
   T_CHECK(!memcmp(f[0], f[2], sizeof f[0]) && !memcmp(f[1], f[3], sizeof f[0]) &&
               !memcmp(df[0], df[2], sizeof df[0]) && !memcmp(df[1], df[3], sizeof df[0]),
           "t = 0 and t = 1 are the ends to the bit");
+  double ends[4], own[4];
+  const double box[6] = {-0.1, 0.2, 0.3, 0.2, 0.4, 0.3};
+  for (int i = 0; i < 2; i++) {
+    T_OK(batten_frep_bounds(ctx, m[2 * i], 1, box, ends + 2 * i), ctx);
+    T_OK(batten_frep_bounds(ctx, i ? p.cone : p.ball, 1, box, own + 2 * i), ctx);
+  }
+  T_CHECK(memcmp(ends, own, sizeof own) == 0, "and so are their bounds");
   double worst = 0;
   for (size_t i = 0; i < COUNT; i++) worst = fmax(worst, fabs(f[4][i] - (f[0][i] + f[1][i]) / 2));
   T_RATIO(worst, 1e-15, "half way is the mean");

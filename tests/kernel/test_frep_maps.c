@@ -172,6 +172,35 @@ static void test_twist(batten_context *ctx) {
   batten_frep_free(bar);
 }
 
+/* Lines along the axis beside it, from a sixth of a turn to many: f on them comes near the bar in few places only,
+ * which no arc of the bounds may leave out. */
+static void test_twisted_lines(batten_context *ctx) {
+  enum { LINES = 300, PLACES = 600 };
+  static double x[3 * PLACES], f[PLACES];
+  batten_frep *bar = make_bar(ctx, (double[]){0.9, -0.1, -1}, (double[]){1.1, 0.1, 1}), *a = NULL;
+  T_OK(batten_frep_twist(ctx, bar, (double[]){0, 0, 0}, (double[]){0, 0, 1}, 30, &a), ctx);
+  uint64_t seed = 29;
+  size_t outside = 0, wide = 0;
+  for (int i = 0; i < LINES; i++) {
+    double t = 2 * PI * t_uniform(&seed), low = -0.5 * t_uniform(&seed);
+    double high = low + (0.5 + 7 * t_uniform(&seed)) / 30, range[2];
+    const double line[6] = {cos(t), sin(t), low, cos(t), sin(t), high};
+    for (int j = 0; j < PLACES; j++) {
+      x[3 * j] = cos(t);
+      x[3 * j + 1] = sin(t);
+      x[3 * j + 2] = fmin(low + (high - low) * j / (PLACES - 1), high);
+    }
+    if (batten_frep_bounds(ctx, a, 1, line, range) < 0 || batten_frep_evaluate(ctx, a, PLACES, x, f, NULL) < 0)
+      outside += PLACES;
+    for (int j = 0; j < PLACES; j++) outside += !(f[j] >= range[0] && f[j] <= range[1]);
+    wide += range[1] > 2;
+  }
+  T_CHECK(outside == 0 && wide == 0, "lines beside the axis of a fast twist: %zu values outside of their bounds",
+          outside);
+  batten_frep_free(a);
+  batten_frep_free(bar);
+}
+
 static void test_taper(batten_context *ctx) {
   batten_frep *bar = make_bar(ctx, (double[]){-0.5, -0.2, -1}, (double[]){0.5, 0.2, 1}), *a = NULL;
   T_OK(batten_frep_taper(ctx, bar, (double[]){0, 0, 0}, (double[]){0, 0, 1}, -0.5, 0.5, 1.5, 0.5, &a), ctx);
@@ -394,6 +423,7 @@ int main(void) {
   batten_context *ctx = t_context(NULL, NULL, 2);
   test_affine(ctx);
   test_twist(ctx);
+  test_twisted_lines(ctx);
   test_taper(ctx);
   test_bend(ctx);
   test_extrude(ctx);

@@ -80,7 +80,8 @@ BATTEN_API batten_status batten_frep_blend(batten_context *ctx, batten_frep_oper
  * narrow only where the slope of f is bounded too, which it is not for stacks: there they tell the sign alone. Making
  * one looks for the box of the node, roughly. */
 BATTEN_API batten_status batten_frep_normalize(batten_context *ctx, batten_frep *a, batten_frep **out);
-/* Is |f| at most the distance to the surface, and equal to it near the surface? Known by construction. */
+/* Is |f| at most the distance to the surface, and equal to it near the surface but beside edges that set operations
+ * make? Known by construction. */
 BATTEN_API int batten_frep_is_distance(const batten_frep *a);
 /* Grows (distance > 0) or shrinks by a distance; f is normalized first where it is no distance. */
 BATTEN_API batten_status batten_frep_offset(batten_context *ctx, batten_frep *a, double distance, batten_frep **out);
@@ -152,8 +153,9 @@ BATTEN_API batten_status batten_frep_deform(batten_context *ctx, batten_frep *a,
 /* ---- use ----------------------------------------------------------------------------------------- */
 
 BATTEN_API unsigned batten_frep_dimension(const batten_frep *a);
-/* points [count][n]; values [count], gradients [count][n]; each may be NULL. Threaded in batches; same bits for any
- * thread count and any batch. Fails: INVALID, NOMEM, CANCELLED, as a host's field fails. */
+/* points [count][n]; values [count], gradients [count][n]; each may be NULL. Solids, polygons and displaced points go
+ * through the context's threads; same bits for any thread count and any batch. Fails: INVALID, NOMEM, CANCELLED, as a
+ * host's field fails. */
 BATTEN_API batten_status batten_frep_evaluate(batten_context *ctx, const batten_frep *a, size_t count,
                                               const double *points, double *values, double *gradients);
 /* boxes [count][2][n] lower and upper corners, lower <= upper, finite; ranges [count][2]: f takes no value in the box
