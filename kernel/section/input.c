@@ -356,7 +356,8 @@ static batten_status settle_gaps(const taking *t) {
   for (size_t i = 0; i < t->count; i++) {
     stack_section *section = &s->sections[i];
     double before = gaps[i > 0 ? i - 1 : 0].value, after = gaps[i < steps ? i : steps > 0 ? steps - 1 : 0].value;
-    section->saturation = t->opt->saturation * (before / 2 + after / 2);
+    /* The shorter one: a spline carries its slope over the longer gap beside it, and swings there by so much more. */
+    section->saturation = t->opt->saturation * fmin(before, after);
     section->t = t->opt->parameters ? t->opt->parameters[i] : i > 0 ? section[-1].t + gaps[i - 1].value : 0;
   }
   /* Heights over the first plane, rounded once. */

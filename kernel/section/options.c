@@ -73,6 +73,9 @@ static batten_status check_arrays(batten_context *ctx, size_t count, const batte
   return BATTEN_OK;
 }
 
+/* The solid, or its box. */
+static bool ends_at_plane(batten_stack_end end) { return end == BATTEN_END_PLANE || end == BATTEN_END_OPEN; }
+
 batten_status stack_check_options(batten_context *ctx, size_t count, const batten_stack_options *o) {
   batten_status st = batten_check_struct(ctx, "batten_stack_options", o->struct_size, sizeof *o);
   if (st >= 0) st = check_names(ctx, o);
@@ -81,5 +84,10 @@ batten_status stack_check_options(batten_context *ctx, size_t count, const batte
   if (st < 0) return st;
   if (count == 1 && o->gap == 0)
     return batten_fail(ctx, BATTEN_E_INVALID, "opt.gap: 0; one section needs the distance that it stands for");
+  if (count == 1 && ends_at_plane(o->ends[0]) && ends_at_plane(o->ends[1]))
+    return batten_fail(
+        ctx, BATTEN_E_INVALID,
+        "opt.ends: both at the plane of the one section, nothing lies between; give one of them FLAT or "
+        "ROUNDED");
   return BATTEN_OK;
 }

@@ -28,7 +28,7 @@
 struct stack_path {
   batten_context *ctx;
   size_t count; /* pieces */
-  double drift;
+  double drift, speeds[2];
   stack_plane *planes; /* [count / STACK_PATH_PIECES + 1], behind the pieces */
   stack_piece pieces[];
 };
@@ -300,6 +300,33 @@ static void fill_planes(stack_path *p, size_t count, const double *t) {
     }
 }
 
+/* The middle of what a section holds, in space. */
+static void section_middle(const stack_section *section, double out[3]) {
+  double lower[2] = {0, 0}, upper[2] = {0, 0}, middle[2];
+  if (section->loops.count > 0) {
+    memcpy(lower, section->loops.lower, sizeof lower);
+    memcpy(upper, section->loops.upper, sizeof upper);
+  } else if (section->apex_count > 0) {
+    memcpy(lower, section->apex[0], sizeof lower);
+    memcpy(upper, section->apex[section->apex_count - 1], sizeof upper);
+  } else if (section->function) {
+    batten_solid_box(section->function, lower, upper);
+  }
+  for (int k = 0; k < 2; k++) middle[k] = lower[k] / 2 + upper[k] / 2;
+  for (int k = 0; k < 3; k++)
+    out[k] = section->origin[k] + middle[0] * section->rotation[0][k] + middle[1] * section->rotation[1][k];
+}
+
+/* Of the origins; where they stand still, as in planes about an axis, of the sections' middles. */
+static double speed_beside(const stack *s, unsigned end) {
+  const stack_section *a = s->sections + (end ? s->count - 2 : 0), *b = a + 1;
+  double middle[2][3], by_origin = vec_distance(a->origin, b->origin);
+  section_middle(a, middle[0]);
+  section_middle(b, middle[1]);
+  double by_middle = vec_distance(middle[0], middle[1]), way = by_origin > 1e-9 * by_middle ? by_origin : by_middle;
+  return way > 0 ? way / (b->t - a->t) : 1;
+}
+
 batten_status stack_path_make(batten_context *ctx, const stack *s, stack_path **out) {
   assert(s->count >= 2);
   size_t count = s->count, bytes;
@@ -333,6 +360,7 @@ batten_status stack_path_make(batten_context *ctx, const stack *s, stack_path **
   path_origins(s, t, scratch, p->pieces);
   for (size_t k = 0; k < p->count; k++) piece_bounds(p->pieces + k);
   fill_planes(p, count, t);
+  for (unsigned end = 0; end < 2; end++) p->speeds[end] = speed_beside(s, end);
   *out = p;
   p = NULL;
   st = BATTEN_OK;
@@ -375,7 +403,4 @@ size_t stack_path_planes(const stack_path *p, const stack_plane **planes) {
   return p->count / STACK_PATH_PIECES + 1;
 }
 
-double stack_path_speed(const stack_path *p, unsigned end) {
-  const stack_plane *a = end ? p->planes + p->count / STACK_PATH_PIECES - 1 : p->planes;
-  return vec_distance(a[0].origin, a[1].origin) / (a[1].t - a[0].t);
-}
+double stack_path_speed(const stack_path *p, unsigned end) { return p->speeds[end]; }

@@ -26,7 +26,7 @@ typedef struct stack_plane {
 /* Piece STACK_PATH_PIECES i + j is the j-th between the sections i and i + 1. */
 size_t stack_path_pieces(const stack_path *p, const stack_piece **pieces);
 size_t stack_path_planes(const stack_path *p, const stack_plane **planes);
-/* Length for a unit of t beside the first (end 0) or last section. */
+/* Length for a unit of t beside the first (end 0) or last section, above 0. */
 double stack_path_speed(const stack_path *p, unsigned end);
 /* The frame at t, held to the piece's ends. */
 void stack_piece_frame(const stack_piece *piece, double t, stack_frame *out);

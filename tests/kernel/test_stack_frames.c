@@ -121,12 +121,56 @@ static void test_other(batten_context *ctx) {
   batten_solid_free(solid);
 }
 
+/* Planes about an axis, all with their origin on it, as a probe that turns sees them: a quarter of a ring. */
+static void test_fan(batten_context *ctx) {
+  stack_scene scene = {0};
+  for (int k = 0; k < 7; k++) {
+    const double angle = SCENE_PI * k / 12, x = cos(angle), z = sin(angle), origin[3] = {0, 0, 0};
+    const double rotation[9] = {x, 0, z, 0, 1, 0, -z, 0, x};
+    stack_scene_section(&scene, origin, rotation);
+    stack_scene_disc(&scene, 30, 0, 8, 50);
+  }
+  for (int given = 0; given < 2; given++)
+    for (int end = BATTEN_END_FLAT; end <= BATTEN_END_ROUNDED; end++) {
+      const double parameters[7] = {0, 1, 2, 3, 4, 5, 6}, step = 1e-5;
+      batten_stack_options o = batten_stack_options_default();
+      batten_solid *solid = NULL;
+      o.ends[0] = o.ends[1] = (batten_stack_end)end;
+      o.parameters = given ? parameters : NULL;
+      T_OK(batten_stack_build(ctx, 7, stack_scene_sections(&scene), &o, &solid, NULL, NULL, NULL), ctx);
+      double worst = 0, inside = -INFINITY;
+      for (int k = 0; k < 50; k++) {
+        double angle = 0.03 + 0.03 * k, r = 30 + 6 * sin(3.0 * k),
+               p[3] = {r * cos(angle), 3 * cos(7.0 * k), r * sin(angle)};
+        double f, gradient[3];
+        batten_solid_evaluate(ctx, solid, 1, p, &f, gradient, NULL);
+        if (k == 25) inside = f;
+        for (int d = 0; d < 3; d++) {
+          double q[2][3], side[2];
+          memcpy(q[0], p, sizeof p);
+          memcpy(q[1], p, sizeof p);
+          q[0][d] -= step;
+          q[1][d] += step;
+          batten_solid_evaluate(ctx, solid, 2, q[0], side, NULL, NULL);
+          double error = fabs((side[1] - side[0]) / (2 * step) - gradient[d]);
+          if (!(error <= worst)) worst = error;
+        }
+      }
+      T_RATIO(worst, 1e-4, "fan, end rule %d, parameters %s: gradients against differences", end,
+              given ? "given" : "not");
+      T_CHECK(inside > 1, "inside of the ring: %g", inside);
+      batten_solid_free(solid);
+    }
+  stack_scene_free(&scene);
+}
+
 int main(void) {
   batten_context *ctx = t_context(NULL, NULL, 1);
   test_block(ctx);
   test_fitted(ctx);
   test_parallel(ctx);
   test_other(ctx);
+  test_fan(ctx);
   batten_context_free(ctx);
   return t_done();
 }

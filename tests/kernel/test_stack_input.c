@@ -84,8 +84,8 @@ static void test_settled(void) {
   T_CHECK(out.parallel && out.gap == 1, "parallel, median gap %g", out.gap);
   T_RATIO(fabs(out.spacing - 6 * sin(PI / SIDE)), 1e-15, "median distance of points");
   T_CHECK(out.sections[3].t == 4 && out.sections[4].t == 5, "t is the height");
-  T_CHECK(out.sections[0].saturation == 2 && out.sections[2].saturation == 3 && out.sections[4].saturation == 2,
-          "saturation by the gaps beside");
+  T_CHECK(out.sections[0].saturation == 2 && out.sections[2].saturation == 2 && out.sections[3].saturation == 2,
+          "saturation by the shorter gap beside");
   T_CHECK(out.end_lengths[0] == 0.5 && out.end_lengths[1] == 1, "half a gap of flat ends, a gap of rounded ones");
   T_CHECK(out.sections[4].scale == 5 && out.angular_velocity[7] == 3, "scales and velocities are copied");
   T_CHECK(out.sections[1].loops.count == 2 && out.sections[1].loops.depth[1] == 1 &&
@@ -265,6 +265,12 @@ static void test_bad_options(void) {
 #undef BAD
   opt = batten_stack_options_default();
   T_STATUS(attempt_count(ctx, &s, 1, &opt), BATTEN_E_INVALID, ctx, "opt.gap: 0; one section needs the distance");
+  opt.gap = 1;
+  opt.ends[0] = BATTEN_END_PLANE;
+  T_CHECK(attempt_count(ctx, &s, 1, &opt) == BATTEN_OK, "one section that ends at its plane on one side");
+  opt.ends[1] = BATTEN_END_OPEN;
+  T_STATUS(attempt_count(ctx, &s, 1, &opt), BATTEN_E_INVALID, ctx, "opt.ends: both at the plane of the one section");
+  opt = batten_stack_options_default();
   opt.gap = 2;
   opt.saturation = INFINITY;
   stack out = {0};

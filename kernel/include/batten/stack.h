@@ -106,7 +106,8 @@ typedef struct batten_stack_options {
   double shape;         /* of RATIONAL, > 0; 1 is linear. Default 1. */
   const double *scales; /* [count] > 0, factors of the section functions: above 1 draws the solid between towards that
                            section. NULL = all 1. */
-  double saturation;    /* F_i becomes w tanh(F_i / w), w = saturation gaps; INFINITY = not at all. Default 2. */
+  double saturation;    /* F_i becomes w tanh(F_i / w), w = saturation times the shorter of the gaps beside section i;
+                           INFINITY = not at all. Default 2. */
   batten_stack_end ends[2]; /* below the first section, above the last one. Default FLAT. */
   double end_height[2];     /* gaps, > 0, or 0 = the rule's default. Default 0. */
   double gap;               /* the distance of sections where there is only one, > 0; ignored otherwise. Default 0. */
