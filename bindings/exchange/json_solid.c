@@ -8,7 +8,8 @@
 #include <string.h>
 
 batten_status bx_explain(bx_json *j, batten_status st) {
-  return st == BATTEN_E_INVALID ? bx_json_fail(j, "%s", batten_error(j->ctx)) : st;
+  const char *text = batten_error(j->ctx); /* options of making a solid are members of the document */
+  return st == BATTEN_E_INVALID ? bx_json_fail(j, "%s", text + (strncmp(text, "opt.", 4) ? 0 : 4)) : st;
 }
 
 batten_status bx_get_choice(bx_json *j, const json_t *object, const char *key, size_t count, const char *const *names,

@@ -373,6 +373,11 @@ static void test_refused(batten_context *ctx, scratch *s) {
       {"\"b\": {\"node\": \"ball\", \"center\": [0, 0, 0], \"radius\": 1}",
        "{\"node\": \"union\", \"of\": [\"b\", {\"node\": \"ball\", \"center\": [0, 0], \"radius\": 1}]}",
        "a.json: root.of[1]: of another dimension"},
+      {"",
+       "{\"node\": \"solid\", \"solid\": {\"kind\": \"stack\", \"shape\": -1, \"below\": {}, \"above\": {}, "
+       "\"sections\": [{\"t\": 0, \"origin\": [0, 0, 0], \"contours\": [[[0, 0]]]}, "
+       "{\"t\": 1, \"origin\": [0, 0, 1], \"contours\": [[[0, 0]]]}]}}",
+       "a.json: root.solid: shape: -1;"},
       {"", "{\"node\": \"solid\", \"solid\": {\"kind\": \"stack\", \"below\": \"open\", \"above\": {}}}",
        "a.json: root.solid.below: it must be an object {"},
       {"", "{\"node\": \"solid\", \"file\": \"a.json\"}", "a.json: root: files stand in scenes alone"},
