@@ -25,7 +25,8 @@ extern "C" {
 /* Closed contours in one plane. Point (x, y) of the section is origin + x rotation[0] + y rotation[1] in space;
  * rotation[2] is the plane's normal, towards the next section. Several contours are parted by even-odd: those inside
  * of another are holes, those inside of a hole solid again; which way round they run does not matter. The first point
- * may be given once more at the end. */
+ * may be given once more at the end. A hole may be tied to its outer contour by edges that run there and back between
+ * the same points: these are taken out, and it counts as a contour of its own. */
 typedef struct batten_section {
   double origin[3];
   double rotation[3][3]; /* rows orthonormal to 1e-6 and right-handed; made exactly so inside */
@@ -148,7 +149,9 @@ typedef struct batten_stack_info {
   size_t sections, contours, holes; /* in use */
   size_t points_given, centers;     /* centres of all sections, on the curves and off them */
   size_t contours_dropped;
-  size_t certified;            /* sections without a wrong sign deeper than the tolerance */
+  size_t certified; /* sections without a wrong sign deeper than the tolerance at any place looked at: a grid
+                       of 64 cells along the longest side, places beside the contours at most 5 tolerances
+                       apart, circles far outside; acute corners have hidden up to 1.5 tolerances */
   double section_residual_max; /* farthest that a section's curve misses its points, |F| / |grad F|; caller's unit */
   double wrong_sign_max;       /* deepest place with a wrong sign, distance to the polygon; caller's unit */
   double tolerance, spacing, gap; /* as used; spacing, gap: medians; caller's unit */
