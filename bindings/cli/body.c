@@ -10,6 +10,13 @@ body_request body_request_default(void) {
   return (body_request){.surface = batten_polygonize_options_default(), .picture = batten_picture_options_default()};
 }
 
+static bool take_sharp(const char *v, double *degrees) {
+  if (!cli_parse_number("--sharp", v, 0, 170, degrees)) return false;
+  if (*degrees == 0 || *degrees >= 15) return true;
+  cli_error("--sharp: %g; give 15 to 170 degrees, or 0", *degrees);
+  return false;
+}
+
 bool body_take(cli_request *common, body_request *q, int key, const char *v) {
   static const char *const colors[] = {"none", "gradient", "mean", "gauss", NULL};
   int word = 0;
@@ -29,6 +36,8 @@ bool body_take(cli_request *common, body_request *q, int key, const char *v) {
       if (!cli_parse_word("--color", v, colors, &word)) return false;
       q->color = (body_color)word;
       return true;
+    case BODY_KEY_SHARP:
+      return take_sharp(v, &q->surface.sharp_deg);
     case BODY_KEY_DOTS:
       q->dots = true;
       return true;

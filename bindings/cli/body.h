@@ -24,6 +24,7 @@ enum {
   BODY_KEY_BOX,
   BODY_KEY_COLOR,
   BODY_KEY_DOTS,
+  BODY_KEY_SHARP,
   BODY_KEY_OWN
 };
 #define BODY_OPTION_OUTPUT(planes) \
@@ -32,6 +33,12 @@ enum {
   { "save", BODY_KEY_SAVE, "FILE", "the solid itself, as JSON that batten reads back to the same bits" }
 #define BODY_OPTION_BOX(otherwise) \
   { "box", BODY_KEY_BOX, "X0,Y0[,Z0],X1,...", "cut the surface at this box; default: " otherwise }
+#define BODY_SHARP_DEG 35 /* of stacks and trees */
+#define BODY_OPTION_SHARP(otherwise)                                                                                 \
+  {                                                                                                                  \
+    "sharp", BODY_KEY_SHARP, "DEG",                                                                                  \
+        "mesh edges follow creases that turn by more than DEG degrees, 0 = none; default " otherwise                 \
+  }
 #define BODY_OPTION_COLOR \
   { "color", BODY_KEY_COLOR, "WHAT", "colour the picture by none, gradient, mean or gauss (curvature); default none" }
 /* -o, pictures and the options above; false after a line on stderr. */

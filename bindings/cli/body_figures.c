@@ -115,6 +115,7 @@ void body_report(const body *b, cli_report *r) {
   cli_report_number(r, "cell", b->surface.cell);
   cli_report_number(r, "surface_distance_max", b->surface.distance_max);
   cli_report_bool(r, "surface_clipped", b->surface.clipped != 0);
+  cli_report_count(r, "crease_vertices", b->surface.crease_vertices);
   if (b->outline) {
     report_plane(b, r);
     return;

@@ -28,6 +28,7 @@ static const cli_option table[] = {
     CLI_OPTION_REPORT,
     BODY_OPTION_SAVE,
     {"cell", BODY_KEY_CELL, "LENGTH", "edge length of the mesh; default 1/150 of the diagonal of the box"},
+    BODY_OPTION_SHARP("35"),
     BODY_OPTION_BOX("the one that\nthe bounds of the functions tell"),
     BODY_OPTION_COLOR,
     {"dots", BODY_KEY_DOTS, NULL, "draw the points that were found on the surface in the picture"},
@@ -193,5 +194,6 @@ done:
 int cli_frep(int argc, char **argv) {
   static const cli_command command = {"frep", "scene", table, print_help, take, work};
   frep_request q = {.body = body_request_default()};
+  q.body.surface.sharp_deg = BODY_SHARP_DEG;
   return cli_command_run(&command, &q.common, argc, argv);
 }

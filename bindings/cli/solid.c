@@ -46,6 +46,7 @@ static const cli_option table[] = {
     {"method", OPT_METHOD, "NAME", "linear solver: auto, cholesky, mixed, ldl or qr; default auto"},
     {"cell", BODY_KEY_CELL, "LENGTH",
      "edge length of the mesh; default from the points' spacing, but at most\n1/120 of the diagonal of their box"},
+    BODY_OPTION_SHARP("0"),
     BODY_OPTION_BOX("the points' box grown by 25 %"),
     CLI_OPTION_MEMORY,
     {"loo", OPT_LOO, "N", "leave-one-out errors of N points, all or none; default 256"},

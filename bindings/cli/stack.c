@@ -71,6 +71,7 @@ static const cli_option table[] = {
     {"draughts", OPT_DRAUGHTS, "Z,...", "report the volume below these heights"},
     {"cell", BODY_KEY_CELL, "LENGTH",
      "edge length of the mesh; default from the points' spacing, but at most\n1/120 of the diagonal of their box"},
+    BODY_OPTION_SHARP("35"),
     BODY_OPTION_BOX("the solid's box grown by 25 %"),
     BODY_OPTION_COLOR,
     {"dots", BODY_KEY_DOTS, NULL, "draw the contours' points in the picture"},
@@ -443,5 +444,6 @@ int cli_stack(int argc, char **argv) {
   stack_request q = {.read = batten_read_sections_options_default(),
                      .options = batten_stack_options_default(),
                      .body = body_request_default()};
+  q.body.surface.sharp_deg = BODY_SHARP_DEG;
   return cli_command_run(&command, &q.common, argc, argv);
 }

@@ -5,11 +5,12 @@
  *
  * No step may turn a triangle over: a change is made only when the new triangles face as the old ones did and as the
  * gradients at their corners ask for. Vertices on the box stay on their faces of it, corners on an edge of the box
- * stay on that edge. */
+ * stay on that edge. Sharp edges are not turned, and vertices on creases move along these only (sharp.c). */
 #include "improve.h"
 
 #include "base/checked.h"
 #include "project.h"
+#include "sharp.h"
 #include "vec.h"
 
 #include <string.h>
@@ -22,7 +23,7 @@ static const double TURN_MIN = 0.5;    /* cosine between a triangle's normals be
 static const double FACE_MIN = 0.2;    /* cosine between its normal and its corners' gradients */
 static const double QUALITY_MIN = 0.3; /* changes make no triangle worse than this, unless it was worse before */
 
-enum { FLIP_SWEEPS = 4, VALENCE_MAX = 12 };
+enum { FLIP_SWEEPS = 4, VALENCE_MAX = 12, SPLITS_MAX = 64 };
 
 typedef struct improver {
   mesh_surface *s;
@@ -31,10 +32,12 @@ typedef struct improver {
   double edge;
   double *target, *values, *gradients; /* [V][3], [V], [V][3] */
   size_t room;                         /* vertices that they hold */
+  double angle;                        /* of creases, 0 = there are none */
 } improver;
 
 static double *point(const mesh_surface *s, uint32_t v) { return s->points + 3 * (size_t)v; }
 static double *normal(const mesh_surface *s, uint32_t v) { return s->normals + 3 * (size_t)v; }
+static unsigned char box_faces(const mesh_surface *s, uint32_t v) { return s->faces[v] & (unsigned char)~MESH_MARKS; }
 
 /* ---- what a change does to a triangle ----------------------------------------------------------- */
 
@@ -83,7 +86,8 @@ static double edge_length(const mesh_surface *s, uint32_t h) {
 
 static batten_status split_long(improver *im) {
   mesh_surface *s = im->s;
-  for (uint32_t h = 0; h < 3 * s->triangle_count; h++) { /* halves come later in the same loop */
+  size_t most = SPLITS_MAX * s->triangle_count; /* needles that are halved across give ever more needles */
+  for (uint32_t h = 0; h < 3 * s->triangle_count && s->triangle_count < most; h++) { /* halves come later in it */
     if (s->origin[h] == MESH_NONE || !(edge_length(s, h) > LONG_EDGE * im->edge)) continue;
     const double *a = point(s, s->origin[h]), *b = point(s, s->origin[mesh_next(h)]);
     double middle[3];
@@ -111,17 +115,30 @@ static bool ring_allows(const improver *im, uint32_t v, uint32_t other, const do
   return count > 0;
 }
 
+/* May the origin of h go, as far as creases are concerned: to a vertex of the same crease along it? A loop of three
+ * sharp edges stays. */
+static bool creases_allow(const mesh_surface *s, uint32_t h) {
+  uint32_t a = s->origin[h], g = s->twin[h];
+  if (!(s->faces[a] & MESH_MARKS)) return true;
+  if ((s->faces[a] & MESH_CORNER) || !s->sharp[h]) return false;
+  if (mesh_surface_sharp_count(s, a) != (mesh_surface_on_boundary(s, a) ? 1u : 2u)) return false;
+  if (mesh_surface_on_boundary(s, a)) return false;
+  if (s->sharp[mesh_next(h)] && s->sharp[mesh_previous(h)]) return false;
+  return g == MESH_NONE || !(s->sharp[mesh_next(g)] && s->sharp[mesh_previous(g)]);
+}
+
 /* Draws the origin of h into its end when that is allowed; to the middle where both may move. */
 static bool try_collapse(improver *im, uint32_t h) {
   mesh_surface *s = im->s;
   uint32_t a = s->origin[h], b = s->origin[mesh_next(h)];
-  if (s->faces[a] & ~s->faces[b]) return false; /* would leave a face of the box */
+  if (box_faces(s, a) & ~box_faces(s, b)) return false; /* would leave a face of the box */
+  if (!creases_allow(s, h)) return false;
   if (!mesh_surface_may_collapse(s, h)) return false;
-  bool even = s->faces[a] == s->faces[b];
+  bool even = s->faces[a] == s->faces[b] && !(s->faces[a] & MESH_MARKS);
   double x[3], n[3];
   for (int k = 0; k < 3; k++) {
     x[k] = even ? 0.5 * point(s, a)[k] + 0.5 * point(s, b)[k] : point(s, b)[k];
-    n[k] = normal(s, a)[k] + normal(s, b)[k];
+    n[k] = (s->faces[b] & MESH_MARKS ? 0 : normal(s, a)[k]) + normal(s, b)[k];
   }
   vec_normalize(n);
   if (!ring_allows(im, a, b, x, n) || (even && !ring_allows(im, b, a, x, n))) return false;
@@ -161,7 +178,7 @@ static double opposite_angles(const double *a, const double *b, const double *c,
  * flat or get flatter by it, and both new ones face outward. */
 static bool wants_flip(const mesh_surface *s, uint32_t h) {
   uint32_t g = s->twin[h];
-  if (g == MESH_NONE || h > g) return false;
+  if (g == MESH_NONE || h > g || s->sharp[h]) return false;
   uint32_t v[4] = {s->origin[h], s->origin[g], s->origin[mesh_previous(h)], s->origin[mesh_previous(g)]};
   const double *a = point(s, v[0]), *b = point(s, v[1]), *c = point(s, v[2]), *d = point(s, v[3]);
   const double *na = normal(s, v[0]), *nb = normal(s, v[1]), *nc = normal(s, v[2]), *nd = normal(s, v[3]);
@@ -203,20 +220,21 @@ static void smooth_target(const improver *im, uint32_t v, double *x) {
   uint32_t around[SURFACE_RING_MAX + 1];
   size_t count = mesh_surface_neighbours(s, v, around), used = 0;
   double d[3] = {0, 0, 0}, n[3];
+  unsigned char faces = box_faces(s, v);
   memcpy(x, point(s, v), sizeof d);
   for (size_t i = 0; i < count; i++) {
-    if (s->faces[v] && i != 0 && i != count - 1) continue;
+    if (faces && i != 0 && i != count - 1) continue;
     for (int k = 0; k < 3; k++) d[k] += point(s, around[i])[k] - x[k];
     used++;
   }
-  if (used == 0) return;
+  if (used == 0 || (s->faces[v] & MESH_MARKS)) return;
   for (int k = 0; k < 3; k++) d[k] *= SMOOTHING / (double)used;
   memcpy(n, normal(s, v), sizeof n);
-  keep_on_faces(s->faces[v], d);
-  keep_on_faces(s->faces[v], n);
+  keep_on_faces(faces, d);
+  keep_on_faces(faces, n);
   vec_normalize(n);
   double off = vec_dot(d, n);
-  if (s->faces[v] && (s->faces[v] & (s->faces[v] - 1))) return; /* on an edge of the box: only the surface decides */
+  if (faces && (faces & (faces - 1))) return; /* on an edge of the box: only the surface decides */
   for (int k = 0; k < 3; k++) x[k] += d[k] - off * n[k];
 }
 
@@ -243,6 +261,28 @@ static bool in_box(const improver *im, const double *x) {
   return true;
 }
 
+/* Vertices on creases to the mean of their neighbours there (share of the way), and onto the crease. */
+static batten_status slide(improver *im, double share) {
+  mesh_surface *s = im->s;
+  batten_crease *creases = NULL;
+  uint32_t *vertices = NULL;
+  size_t count = 0;
+  batten_status st = mesh_surface_creases(s, share, &count, &vertices, &creases);
+  if (st >= 0) st = batten_crease_refine(im->sampler, count, creases, 0.5 * im->edge, im->angle);
+  for (size_t i = 0; st >= 0 && i < count; i++) {
+    double n[3];
+    uint32_t v = vertices[i];
+    for (int k = 0; k < 3; k++) n[k] = creases[i].normal[0][k] + creases[i].normal[1][k];
+    if (!creases[i].found || !vec_normalize(n)) continue;
+    if (!in_box(im, creases[i].x) || !ring_allows(im, v, MESH_NONE, creases[i].x, n)) continue;
+    memcpy(point(s, v), creases[i].x, sizeof n);
+    memcpy(normal(s, v), n, sizeof n);
+  }
+  batten_free(s->ctx, creases);
+  batten_free(s->ctx, vertices);
+  return st;
+}
+
 /* One pass over all vertices of the compacted surface; on_field: back to f = 0 after the move along the surface. */
 static batten_status smooth(improver *im, bool on_field) {
   mesh_surface *s = im->s;
@@ -253,6 +293,7 @@ static batten_status smooth(improver *im, bool on_field) {
   if (st < 0) return st;
   for (uint32_t v = 0; v < s->vertex_count; v++) {
     double *x = im->target + 3 * (size_t)v, n[3];
+    if (s->faces[v] & MESH_MARKS) continue;
     memcpy(n, normal(s, v), sizeof n);
     if (on_field)
       batten_newton_step(3, im->values[v], im->gradients + 3 * (size_t)v, s->faces[v], STEP_MAX * im->edge, x, n);
@@ -268,23 +309,46 @@ static batten_status smooth(improver *im, bool on_field) {
   return BATTEN_OK;
 }
 
+static void improver_free(improver *im) {
+  batten_free(im->s->ctx, im->target);
+  batten_free(im->s->ctx, im->values);
+  batten_free(im->s->ctx, im->gradients);
+}
+
+static batten_status improve_round(improver *im, bool on_field) {
+  batten_status st = split_long(im);
+  if (st < 0) return st;
+  collapse_short(im);
+  flip_sweeps(im);
+  st = mesh_surface_compact(im->s);
+  if (st >= 0 && on_field && im->angle > 0) st = slide(im, 0.5);
+  if (st >= 0) st = smooth(im, on_field);
+  if (st >= 0) flip_sweeps(im);
+  return st;
+}
+
 batten_status mesh_surface_improve(mesh_surface *s, batten_sampler *sampler, const double *lower, const double *upper,
                                    double edge, unsigned rounds) {
   improver im = {.s = s, .sampler = sampler, .lower = lower, .upper = upper, .edge = edge};
   batten_status st = BATTEN_OK;
   for (unsigned round = 0; st >= 0 && round < rounds; round++) {
     st = batten_progress(s->ctx, "improve", (double)round / rounds);
-    if (st >= 0) st = split_long(&im);
-    if (st < 0) break;
-    collapse_short(&im);
-    flip_sweeps(&im);
-    st = mesh_surface_compact(s);
-    if (st >= 0) st = smooth(&im, round % 2 == 0 || round + 1 == rounds);
-    if (st >= 0) flip_sweeps(&im);
+    if (st >= 0) st = improve_round(&im, round % 2 == 0 || round + 1 == rounds);
   }
-  batten_free(s->ctx, im.target);
-  batten_free(s->ctx, im.values);
-  batten_free(s->ctx, im.gradients);
+  improver_free(&im);
+  return st;
+}
+
+batten_status mesh_surface_improve_creased(mesh_surface *s, batten_sampler *sampler, const double *lower,
+                                           const double *upper, double edge, double angle, unsigned rounds) {
+  improver im = {.s = s, .sampler = sampler, .lower = lower, .upper = upper, .edge = edge, .angle = angle};
+  batten_status st = BATTEN_OK;
+  for (unsigned round = 0; st >= 0 && round < rounds; round++) {
+    st = batten_progress(s->ctx, "sharpen", (double)(round + 1) / (rounds + 1));
+    if (st >= 0) st = improve_round(&im, round % 2 == 1);
+  }
+  if (st >= 0) st = slide(&im, 0);
+  improver_free(&im);
   return st;
 }
 

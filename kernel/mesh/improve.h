@@ -10,6 +10,10 @@
 batten_status mesh_surface_improve(mesh_surface *s, batten_sampler *sampler, const double *lower, const double *upper,
                                    double edge, unsigned rounds);
 
+/* Such rounds that keep to creases (sharp.h), which are bent by more than angle (radians). */
+batten_status mesh_surface_improve_creased(mesh_surface *s, batten_sampler *sampler, const double *lower,
+                                           const double *upper, double edge, double angle, unsigned rounds);
+
 /* Puts every vertex on f = 0 to |f| / |grad f| <= tolerance; *distance_max: what is left. Vertices move at most by
  * about `edge`, those on the box within its faces. */
 batten_status mesh_surface_settle(mesh_surface *s, batten_sampler *sampler, double edge, double tolerance,

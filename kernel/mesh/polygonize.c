@@ -5,6 +5,7 @@
 #include "improve.h"
 #include "mesh_inner.h"
 #include "seeds.h"
+#include "sharp.h"
 #include "track.h"
 
 #include "base/checked.h"
@@ -12,8 +13,10 @@
 #include <string.h>
 
 static const double BOX_MARGIN = 0.25;  /* of the seeds' largest extent, on every side */
+static const double DEGREE = 0.017453292519943295;
 static const double CELL_SPACING = 0.7; /* of the median distance between neighbouring seeds */
 static const double CELL_LARGEST = 1.0 / 60, CELL_SMALLEST = 1.0 / 200; /* of the diagonal of the seeds' box */
+static const double SHARP_MIN = 15, SHARP_MAX = 170; /* degrees: flatter creases are not told from smooth places */
 static const double CUBE_EDGES = 1.25; /* lattice cubes are wider than the edges: they give 3.6 vertices for each */
 
 batten_polygonize_options batten_polygonize_options_default(void) {
@@ -33,6 +36,9 @@ static batten_status check_options(batten_context *ctx, unsigned n, const batten
   if (!(o->accuracy > 0) || !(o->accuracy < 1))
     return batten_fail(ctx, BATTEN_E_INVALID, "opt.accuracy: %g; give a share of the box diagonal, 0 < accuracy < 1",
                        o->accuracy);
+  if (!(o->sharp_deg >= 0) || !(o->sharp_deg <= SHARP_MAX) || (o->sharp_deg > 0 && o->sharp_deg < SHARP_MIN))
+    return batten_fail(ctx, BATTEN_E_INVALID, "opt.sharp_deg: %g; give an angle from %g to %g degrees, or 0",
+                       o->sharp_deg, SHARP_MIN, SHARP_MAX);
   bool given = false;
   for (unsigned k = 0; k < n; k++) given = given || o->lower[k] != 0 || o->upper[k] != 0;
   for (unsigned k = 0; given && k < n; k++)
@@ -193,6 +199,39 @@ batten_status batten_polygonize_warn(batten_context *ctx, const batten_polygoniz
   return BATTEN_OK;
 }
 
+static batten_status count_crossings(const mesh_surface *s, size_t *pairs) {
+  return batten_mesh_find_crossings(s->ctx, s->vertex_count, s->points, s->triangle_count, s->origin, NULL, pairs);
+}
+
+/* Makes the settled surface follow its creases; where that makes it cross itself, or misses the accuracy that it had,
+ * it stays as it was. */
+static batten_status sharpen(batten_sampler *sampler, const batten_frame *frame, double edge,
+                             const batten_polygonize_options *opt, mesh_surface *surface,
+                             batten_polygonize_info *info) {
+  double distance, tolerance = opt->accuracy * frame->diagonal;
+  size_t count, crossings = 0;
+  mesh_surface smooth = {.ctx = sampler->ctx};
+  batten_status st = mesh_surface_copy(surface, &smooth);
+  if (st >= 0)
+    st = mesh_surface_sharpen(surface, sampler, frame->lower, frame->upper, edge, opt->sharp_deg * DEGREE, &count);
+  if (st >= 0 && count) {
+    st = mesh_surface_settle(surface, sampler, edge, tolerance, &distance);
+    if (st >= 0) st = count_crossings(surface, &crossings);
+    bool better = crossings == 0 && distance <= fmax(tolerance, info->distance_max);
+    if (st >= 0 && better) {
+      info->crease_vertices = count;
+      info->distance_max = distance;
+    }
+    if (st >= 0 && !better) {
+      mesh_surface keep = *surface;
+      *surface = smooth;
+      smooth = keep;
+    }
+  }
+  mesh_surface_free(&smooth);
+  return st;
+}
+
 /* One attempt: *surface is a mesh with edges of about `edge`, from a lattice of cubes with the side `cube`. */
 static batten_status attempt(batten_sampler *sampler, const batten_frame *frame, double cube, double edge,
                              size_t seed_count, const double *seeds, const batten_polygonize_options *opt,
@@ -210,9 +249,9 @@ static batten_status attempt(batten_sampler *sampler, const batten_frame *frame,
   st = mesh_surface_build(sampler->ctx, &rough, surface);
   if (st >= 0) st = mesh_surface_improve(surface, sampler, frame->lower, frame->upper, edge, opt->improve);
   if (st >= 0) st = mesh_surface_settle(surface, sampler, edge, opt->accuracy * frame->diagonal, &info->distance_max);
-  if (st >= 0)
-    st = batten_mesh_find_crossings(sampler->ctx, surface->vertex_count, surface->points, surface->triangle_count,
-                                    surface->origin, NULL, &info->self_intersections);
+  info->crease_vertices = 0;
+  if (st >= 0 && opt->sharp_deg > 0 && opt->improve > 0) st = sharpen(sampler, frame, edge, opt, surface, info);
+  if (st >= 0) st = count_crossings(surface, &info->self_intersections);
   info->time_improve_s += batten_now() - start;
   return st;
 }

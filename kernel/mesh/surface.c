@@ -13,6 +13,7 @@ void mesh_surface_free(mesh_surface *s) {
   batten_free(s->ctx, s->out);
   batten_free(s->ctx, s->origin);
   batten_free(s->ctx, s->twin);
+  batten_free(s->ctx, s->sharp);
   *s = (mesh_surface){.ctx = s->ctx};
 }
 
@@ -73,12 +74,14 @@ batten_status mesh_surface_build(batten_context *ctx, batten_rough_surface *roug
   s.origin = rough->triangles;
   *rough = (batten_rough_surface){0};
   s.points_capacity = s.faces_capacity = s.normals_capacity = s.out_capacity = s.vertex_count;
-  s.origin_capacity = s.twin_capacity = 3 * s.triangle_count;
+  s.origin_capacity = s.twin_capacity = s.sharp_capacity = 3 * s.triangle_count;
   uint32_t *order = batten_alloc_array(ctx, 3 * s.triangle_count, sizeof *order);
   if (!order || !(s.normals = batten_alloc_array(ctx, s.vertex_count, 3 * sizeof *s.normals)) ||
       !(s.out = batten_alloc_array(ctx, s.vertex_count, sizeof *s.out)) ||
-      !(s.twin = batten_alloc_array(ctx, 3 * s.triangle_count, sizeof *s.twin)))
+      !(s.twin = batten_alloc_array(ctx, 3 * s.triangle_count, sizeof *s.twin)) ||
+      !(s.sharp = batten_alloc_array(ctx, 3 * s.triangle_count, 1)))
     goto done;
+  memset(s.sharp, 0, 3 * s.triangle_count);
   st = batten_mesh_sort_edges(ctx, s.vertex_count, s.triangle_count, s.origin, order);
   if (st < 0) goto done;
   st = pair_half_edges(&s, order);
@@ -89,6 +92,32 @@ done:
   if (st < 0) mesh_surface_free(&s);
   batten_free(ctx, order);
   return st;
+}
+
+/* A copy of size bytes for each of count items; NULL: out of memory. */
+static void *copy_array(batten_context *ctx, const void *from, size_t count, size_t size) {
+  void *to = batten_alloc_array(ctx, count, size);
+  if (to && count) memcpy(to, from, count * size);
+  return to;
+}
+
+batten_status mesh_surface_copy(const mesh_surface *s, mesh_surface *out) {
+  batten_context *ctx = s->ctx;
+  size_t v = s->vertex_count, h = 3 * s->triangle_count;
+  mesh_surface copy = {.ctx = ctx, .vertex_count = v, .triangle_count = s->triangle_count};
+  copy.points_capacity = copy.normals_capacity = copy.faces_capacity = copy.out_capacity = v;
+  copy.origin_capacity = copy.twin_capacity = copy.sharp_capacity = h;
+  if (!(copy.points = copy_array(ctx, s->points, v, 3 * sizeof *s->points)) ||
+      !(copy.normals = copy_array(ctx, s->normals, v, 3 * sizeof *s->normals)) ||
+      !(copy.faces = copy_array(ctx, s->faces, v, 1)) || !(copy.out = copy_array(ctx, s->out, v, sizeof *s->out)) ||
+      !(copy.origin = copy_array(ctx, s->origin, h, sizeof *s->origin)) ||
+      !(copy.twin = copy_array(ctx, s->twin, h, sizeof *s->twin)) ||
+      !(copy.sharp = copy_array(ctx, s->sharp, h, 1))) {
+    mesh_surface_free(&copy);
+    return BATTEN_E_NOMEM;
+  }
+  *out = copy;
+  return BATTEN_OK;
 }
 
 /* ---- rings -------------------------------------------------------------------------------------- */
@@ -115,6 +144,22 @@ size_t mesh_surface_neighbours(const mesh_surface *s, uint32_t v, uint32_t *vert
   return count;
 }
 
+uint32_t mesh_surface_find(const mesh_surface *s, uint32_t a, uint32_t b) {
+  uint32_t ring[SURFACE_RING_MAX];
+  size_t count = mesh_surface_ring(s, a, ring);
+  for (size_t i = 0; i < count; i++)
+    if (s->origin[mesh_next(ring[i])] == b) return ring[i];
+  return MESH_NONE;
+}
+
+size_t mesh_surface_sharp_count(const mesh_surface *s, uint32_t v) {
+  uint32_t ring[SURFACE_RING_MAX];
+  size_t count = mesh_surface_ring(s, v, ring), sharp = 0;
+  if (count == 0) return SURFACE_RING_MAX;
+  for (size_t i = 0; i < count; i++) sharp += s->sharp[ring[i]];
+  return sharp + (mesh_surface_on_boundary(s, v) && s->sharp[mesh_previous(ring[count - 1])]);
+}
+
 static bool are_neighbours(const mesh_surface *s, uint32_t a, uint32_t b) {
   uint32_t around[SURFACE_RING_MAX + 1];
   size_t count = mesh_surface_neighbours(s, a, around);
@@ -136,7 +181,8 @@ static batten_status make_room(mesh_surface *s) {
       batten_reserve(ctx, (void **)&s->faces, &s->faces_capacity, v, 1) < 0 ||
       batten_reserve(ctx, (void **)&s->out, &s->out_capacity, v, sizeof *s->out) < 0 ||
       batten_reserve(ctx, (void **)&s->origin, &s->origin_capacity, h, sizeof *s->origin) < 0 ||
-      batten_reserve(ctx, (void **)&s->twin, &s->twin_capacity, h, sizeof *s->twin) < 0)
+      batten_reserve(ctx, (void **)&s->twin, &s->twin_capacity, h, sizeof *s->twin) < 0 ||
+      batten_reserve(ctx, (void **)&s->sharp, &s->sharp_capacity, h, 1) < 0)
     return BATTEN_E_NOMEM;
   return BATTEN_OK;
 }
@@ -149,6 +195,9 @@ static uint32_t split_half(mesh_surface *s, uint32_t h, uint32_t m) {
   s->origin[n + 1] = b;
   s->origin[n + 2] = c;
   set_twins(s, n + 1, s->twin[hn]);
+  s->sharp[n] = s->sharp[h];
+  s->sharp[n + 1] = s->sharp[hn];
+  s->sharp[n + 2] = s->sharp[hn] = 0;
   s->origin[hn] = m;
   set_twins(s, hn, n + 2);
   if (s->out[b] == hn) s->out[b] = n + 1;
@@ -162,7 +211,8 @@ uint32_t mesh_surface_split(mesh_surface *s, uint32_t h, const double *x) {
   double *n = s->normals + 3 * (size_t)m;
   for (size_t k = 0; k < 3; k++) n[k] = s->normals[3 * (size_t)a + k] + s->normals[3 * (size_t)b + k];
   vec_normalize(n);
-  s->faces[m] = g == MESH_NONE ? s->faces[a] & s->faces[b] : 0;
+  s->faces[m] = g == MESH_NONE ? s->faces[a] & s->faces[b] & (unsigned char)~MESH_MARKS : 0;
+  if (s->sharp[h]) s->faces[m] |= MESH_CREASE;
   uint32_t mb = split_half(s, h, m);
   s->out[m] = mb;
   s->twin[mb] = MESH_NONE;
@@ -170,6 +220,38 @@ uint32_t mesh_surface_split(mesh_surface *s, uint32_t h, const double *x) {
   uint32_t ma = split_half(s, g, m);
   set_twins(s, h, ma);
   set_twins(s, mb, g);
+  return m;
+}
+
+uint32_t mesh_surface_poke(mesh_surface *s, uint32_t t, const double *x) {
+  if (make_room(s) < 0) return MESH_NONE;
+  uint32_t m = (uint32_t)s->vertex_count++, h = 3 * t, n = 3 * (uint32_t)s->triangle_count;
+  s->triangle_count += 2;
+  memcpy(s->points + 3 * (size_t)m, x, 3 * sizeof *x);
+  double *normal = s->normals + 3 * (size_t)m;
+  for (size_t k = 0; k < 3; k++) {
+    normal[k] = 0;
+    for (uint32_t i = 0; i < 3; i++) normal[k] += s->normals[3 * (size_t)s->origin[h + i] + k];
+  }
+  vec_normalize(normal);
+  s->faces[m] = 0;
+  for (uint32_t i = 1; i < 3; i++) { /* its sides 1 and 2 get a triangle each, with the sides: old, to m, from m */
+    uint32_t side = n + 3 * (i - 1), old = h + i;
+    s->origin[side] = s->origin[old];
+    s->origin[side + 1] = s->origin[h + (i + 1) % 3];
+    s->origin[side + 2] = m;
+    set_twins(s, side, s->twin[old]);
+    if (s->twin[old] == MESH_NONE) s->twin[side] = MESH_NONE;
+    s->sharp[side] = s->sharp[old];
+    s->sharp[side + 1] = s->sharp[side + 2] = 0;
+    if (s->out[s->origin[old]] == old) s->out[s->origin[old]] = side;
+  }
+  s->origin[h + 2] = m;
+  s->sharp[h + 1] = s->sharp[h + 2] = 0;
+  set_twins(s, h + 1, n + 2);     /* b -> m and m -> b */
+  set_twins(s, n + 1, n + 5);     /* c -> m and m -> c */
+  set_twins(s, n + 4, h + 2);     /* a -> m and m -> a */
+  s->out[m] = h + 2;
   return m;
 }
 
@@ -198,8 +280,11 @@ bool mesh_surface_may_collapse(const mesh_surface *s, uint32_t h) {
 static void close_gap(mesh_surface *s, uint32_t h) {
   uint32_t hn = mesh_next(h), hp = mesh_previous(h), c = s->origin[hp];
   uint32_t cb = s->twin[hn], ac = s->twin[hp];
+  unsigned char sharp = s->sharp[hn] | s->sharp[hp];
   if (cb != MESH_NONE) s->twin[cb] = ac;
   if (ac != MESH_NONE) s->twin[ac] = cb;
+  if (cb != MESH_NONE) s->sharp[cb] = sharp;
+  if (ac != MESH_NONE) s->sharp[ac] = sharp;
   if (s->out[c] == hp) s->out[c] = cb;
   s->origin[h] = s->origin[hn] = s->origin[hp] = MESH_NONE;
 }
@@ -245,6 +330,12 @@ void mesh_surface_flip(mesh_surface *s, uint32_t h) {
   uint32_t hn = mesh_next(h), hp = mesh_previous(h), g = s->twin[h], gn = mesh_next(g), gp = mesh_previous(g);
   uint32_t a = s->origin[h], b = s->origin[g], c = s->origin[hp], d = s->origin[gp];
   uint32_t bc = s->twin[hn], ca = s->twin[hp], ad = s->twin[gn], db = s->twin[gp];
+  unsigned char sharp_ca = s->sharp[hp], sharp_ad = s->sharp[gn], sharp_db = s->sharp[gp], sharp_bc = s->sharp[hn];
+  s->sharp[hn] = sharp_ca;
+  s->sharp[hp] = sharp_ad;
+  s->sharp[gn] = sharp_db;
+  s->sharp[gp] = sharp_bc;
+  s->sharp[h] = s->sharp[g] = 0;
   s->origin[h] = d; /* triangle d c a */
   s->origin[hn] = c;
   s->origin[hp] = a;
@@ -286,6 +377,7 @@ batten_status mesh_surface_compact(mesh_surface *s) {
     for (size_t k = 0; k < 3; k++) {
       uint32_t g = s->twin[3 * t + k];
       s->origin[3 * to + k] = vertex_number[s->origin[3 * t + k]];
+      s->sharp[3 * to + k] = s->sharp[3 * t + k];
       s->twin[3 * to + k] = g == MESH_NONE ? MESH_NONE : 3 * triangle_number[g / 3] + g % 3;
     }
   }

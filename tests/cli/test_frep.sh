@@ -9,7 +9,7 @@ set -u
 run 0 "" frep --help
 cp out help
 check "no line of the help is longer than 118" awk 'length > 118 { exit 1 }' help
-for option in output picture report save cell box color dots view up size title memory threads quiet; do
+for option in output picture report save cell sharp box color dots view up size title memory threads quiet; do
   check "the help tells --$option" grep -q -- " --$option" help
 done
 sed -n '/^example/,/^exit status/p' help | sed -n 's/^  //p' >example.sh
@@ -21,6 +21,7 @@ check "and its picture" test -s scene.png
 is scene_report.json status ok
 is scene_report.json nodes 6
 is scene_report.json mesh_components 1
+holds scene_report.json crease_vertices 'x > 20'
 is scene_report.json mesh_closed True
 is scene_report.json mesh_manifold True
 is scene_report.json mesh_self_intersections 0

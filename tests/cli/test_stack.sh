@@ -10,7 +10,7 @@ run 0 "" stack --help
 cp out help
 check "no line of the help is longer than 118" awk 'length > 118 { exit 1 }' help
 for option in output picture report save gap points method tolerance pair-distance min-area apex between shape scales saturation ends \
-  end-height rotation path parameter route link draughts cell box color dots view up size title memory threads quiet; do
+  end-height rotation path parameter route link draughts cell sharp box color dots view up size title memory threads quiet; do
   check "the help tells --$option" grep -q -- " --$option" help
 done
 sed -n '/^example/,/^exit status/p' help | grep '^  ' >example.sh
@@ -28,6 +28,7 @@ is trunk.json sections_certified 7
 is trunk.json pieces 1
 is trunk.json non_overlaps 0
 is trunk.json mesh_components 1
+holds trunk.json crease_vertices 'x > 20'
 is trunk.json mesh_genus 0
 is trunk.json mesh_closed True
 is trunk.json mesh_manifold True

@@ -151,6 +151,9 @@ typedef struct batten_polygonize_options {
   unsigned improve; /* rounds of mesh improvement, each half an evaluation per vertex. 0 leaves the slivers of the
                        lattice, 4 make nearly all angles > 20 degrees. Default 8. */
   size_t evaluations_max; /* give up above so many field evaluations, 0 = none. Default 0. */
+  double sharp_deg; /* mesh edges follow creases of f = 0, kinks of f where normals turn by more than so many degrees,
+                       15 .. 170; vertices go to their corners and tips. Not with improve 0, and places where it is
+                       not safe stay as they are. 0: kinks are chamfered at the cell. Default 0. */
 } batten_polygonize_options;
 BATTEN_API batten_polygonize_options batten_polygonize_options_default(void);
 
@@ -162,19 +165,21 @@ typedef struct batten_polygonize_info {
                           in which f changes its sign (at kinks and jumps of f); caller's unit */
   int clipped;         /* the surface reaches the box and was cut cleanly there */
   size_t self_intersections; /* pairs of triangles that cross, see batten_mesh_self_intersections */
+  size_t crease_vertices;    /* on creases, at their corners and at tips, with opt.sharp_deg */
   double time_track_s, time_improve_s;
 } batten_polygonize_info;
 
 /* The surface of the solid f >= 0, tracked from the seeds [seed_count][3] through the cells that it crosses;
  * triangles counter-clockwise seen from outside (f < 0). Marching tetrahedra on a body-centred lattice, one batch of
- * evaluations for each front, then rounds of edge splits, collapses, flips and smoothing on the surface. The result
+ * evaluations for each front, then rounds of edge splits, collapses, flips and smoothing on the surface; with
+ * sharp_deg, edges along creases by the tangent planes beside them, and such rounds that keep to these. The result
  * is an oriented 2-manifold: closed, or with boundary loops that lie on the box (BATTEN_W_CLIPPED). Components
  * without a seed are not found, by design. A mesh that crosses itself is made again on a lattice of half, then a
  * quarter of the cell (and then half the edges). Same bits for any order of the seeds and any number of threads.
  *   field   three-dimensional; order 0 costs six evaluations for a gradient
  *   seeds   NULL with seed_count 0, opt.lower and opt.upper given, and a field with bounds: the whole surface in the
  *           box is found (batten_find_seeds with the cell; 0 = 1/60 of the box's diagonal)
- *   Progress phases: "search" (without seeds), "surface", "improve", "settle".
+ *   Progress phases: "search" (without seeds), "surface", "improve", "settle", "sharpen".
  * Positive status: BATTEN_W_ACCURACY (accuracy is missed, or the mesh crosses itself), BATTEN_W_CLIPPED.
  * Fails: INVALID (also: the field is not finite somewhere, the text names the point), NOMEM, TOO_LARGE (cells,
  * indices, evaluations_max), NOT_FOUND (f changes its sign near no seed), CANCELLED, and as the field fails. info may
