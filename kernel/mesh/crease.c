@@ -4,9 +4,9 @@
  * sheets at a distance w from the kink, one sample in each sheet, stepped onto f = 0 along its own gradient. The next
  * x minimises the squared distances to the planes and, among these points, the way from the last x (Kobbelt, Botsch,
  * Schwanecke, Seidel 2001, "Feature sensitive surface extraction from volume data"): by eigenvalues, those that are
- * near 0 left out. Curved sheets leave their planes by w^2, so that w may shrink with x. What turns smoothly, if fast,
- * is told from a kink by this: its normals come together as w shrinks. Samples lie on the surface, since off it the
- * gradients of some fields (R-functions, distances around edges) belong to no sheet. */
+ * near 0 left out. Curved sheets leave their planes by w^2, so that w may shrink with x. What turns smoothly, if
+ * fast, is told from a kink by this: its normals come together as w shrinks. Samples lie on the surface, since off it
+ * the gradients of some fields (R-functions, distances around edges) belong to no sheet. */
 #include "crease.h"
 
 #include "base/checked.h"
@@ -75,8 +75,7 @@ bool batten_crease_aside(batten_crease *c) {
     for (int k = 0; k < 3 && side < 0; k++) c->aside[i][k] = -c->aside[i][k];
   }
   /* Both edges bend the same way: the crease is convex, or concave, seen from each side. */
-  return c->sheets == 3 ||
-         (vec_dot(c->aside[0], c->normal[1]) < 0) == (vec_dot(c->aside[1], c->normal[0]) < 0);
+  return c->sheets == 3 || (vec_dot(c->aside[0], c->normal[1]) < 0) == (vec_dot(c->aside[1], c->normal[0]) < 0);
 }
 
 bool batten_crease_meet(batten_crease *c) {
@@ -103,8 +102,7 @@ bool batten_crease_between(batten_crease *c) {
     double s = along_a + (along_b - along_a) * (off_a / (off_a + off_b));
     for (int k = 0; k < 3; k++) c->x[k] += s * line[k];
   }
-  return vec_distance(c->home[0], c->x) + vec_distance(c->home[1], c->x) <
-         3 * vec_distance(c->home[0], c->home[1]);
+  return vec_distance(c->home[0], c->x) + vec_distance(c->home[1], c->x) < 3 * vec_distance(c->home[0], c->home[1]);
 }
 
 /* A sample beside an edge that belongs to neither of its sheets: with the third one x may be a corner. */

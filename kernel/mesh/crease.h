@@ -17,8 +17,9 @@ typedef struct batten_crease {
   bool found;
 } batten_crease;
 
-/* Sets x of an edge's crease (sheets = 2) from a = home[0] and b = home[1] in the sheets, on f = 0, and their normals:
- * where the planes there meet, and the line from a to b when the sheets are unrolled. False: not plausible. */
+/* Sets x of an edge's crease (sheets = 2) from a = home[0] and b = home[1] in the sheets, on f = 0, and their
+ * normals: where the planes there meet, and the line from a to b when the sheets are unrolled. False: not plausible.
+ */
 bool batten_crease_between(batten_crease *c);
 /* Sets x to the point nearest to itself that all planes at the homes have in common; false: there is none. */
 bool batten_crease_meet(batten_crease *c);
@@ -27,8 +28,9 @@ bool batten_crease_meet(batten_crease *c);
 bool batten_crease_aside(batten_crease *c);
 
 /* Refines the creases that are found by samples beside them, nearer by 4 in each round, from edge / 4 on; those that
- * turn out to be none (smooth, or lost) are no longer found. A third sheet that shows up beside an edge makes a corner
- * of it. angle: in radians, by which the normals of sheets differ at least. One evaluation a round and sheet. */
+ * turn out to be none (smooth, or lost) are no longer found. A third sheet that shows up beside an edge makes a
+ * corner of it. angle: in radians, by which the normals of sheets differ at least. One evaluation a round and sheet.
+ */
 batten_status batten_crease_refine(batten_sampler *sampler, size_t count, batten_crease *creases, double edge,
                                    double angle);
 

@@ -12,7 +12,7 @@
 
 #include <string.h>
 
-static const double BOX_MARGIN = 0.25;  /* of the seeds' largest extent, on every side */
+static const double BOX_MARGIN = 0.25; /* of the seeds' largest extent, on every side */
 static const double DEGREE = 0.017453292519943295;
 static const double CELL_SPACING = 0.7; /* of the median distance between neighbouring seeds */
 static const double CELL_LARGEST = 1.0 / 60, CELL_SMALLEST = 1.0 / 200; /* of the diagonal of the seeds' box */
@@ -203,32 +203,56 @@ static batten_status count_crossings(const mesh_surface *s, size_t *pairs) {
   return batten_mesh_find_crossings(s->ctx, s->vertex_count, s->points, s->triangle_count, s->origin, NULL, pairs);
 }
 
-/* Makes the settled surface follow its creases; where that makes it cross itself, or misses the accuracy that it had,
- * it stays as it was. */
+/* Corners of triangles that cross others, to *avoid, of which there are *count then. */
+static batten_status add_crossings(const mesh_surface *s, size_t *count, double **avoid, size_t *pairs) {
+  batten_context *ctx = s->ctx;
+  size_t marked = 0;
+  unsigned char *marks = batten_alloc_array(ctx, s->triangle_count, 1);
+  batten_status st =
+      marks ? batten_mesh_find_crossings(ctx, s->vertex_count, s->points, s->triangle_count, s->origin, marks, pairs)
+            : BATTEN_E_NOMEM;
+  for (size_t t = 0; st >= 0 && *pairs && t < s->triangle_count; t++) marked += marks[t];
+  if (marked) {
+    double *grown = batten_realloc_array(ctx, *avoid, *count + marked, 3 * sizeof *grown);
+    if (grown) *avoid = grown;
+    if (!grown) st = BATTEN_E_NOMEM;
+    for (size_t t = 0; grown && t < s->triangle_count; t++)
+      if (marks[t]) memcpy(grown + 3 * (*count)++, s->points + 3 * (size_t)s->origin[3 * t], 3 * sizeof *grown);
+  }
+  batten_free(ctx, marks);
+  return st;
+}
+
+/* Makes the settled surface follow its creases. Where that makes it cross itself it is tried again without these
+ * places; in the end, or where it misses the accuracy that it had, it stays as it was. */
 static batten_status sharpen(batten_sampler *sampler, const batten_frame *frame, double edge,
                              const batten_polygonize_options *opt, mesh_surface *surface,
                              batten_polygonize_info *info) {
-  double distance, tolerance = opt->accuracy * frame->diagonal;
-  size_t count, crossings = 0;
-  mesh_surface smooth = {.ctx = sampler->ctx};
-  batten_status st = mesh_surface_copy(surface, &smooth);
-  if (st >= 0)
-    st = mesh_surface_sharpen(surface, sampler, frame->lower, frame->upper, edge, opt->sharp_deg * DEGREE, &count);
-  if (st >= 0 && count) {
-    st = mesh_surface_settle(surface, sampler, edge, tolerance, &distance);
-    if (st >= 0) st = count_crossings(surface, &crossings);
-    bool better = crossings == 0 && distance <= fmax(tolerance, info->distance_max);
-    if (st >= 0 && better) {
+  enum { TRIES = 3 };
+  double distance = 0, tolerance = opt->accuracy * frame->diagonal, *avoid = NULL;
+  size_t avoided = 0;
+  bool done = false;
+  batten_status st = BATTEN_OK;
+  for (int attempt = 0; st >= 0 && !done && attempt < TRIES; attempt++) {
+    size_t count = 0, crossings = 0;
+    mesh_surface sharp = {.ctx = sampler->ctx};
+    st = mesh_surface_copy(surface, &sharp);
+    if (st >= 0)
+      st = mesh_surface_sharpen(&sharp, sampler, frame->lower, frame->upper, edge, opt->sharp_deg * DEGREE, avoided,
+                                avoid, &count);
+    if (st >= 0 && count) st = mesh_surface_settle(&sharp, sampler, edge, tolerance, &distance);
+    if (st >= 0 && count) st = add_crossings(&sharp, &avoided, &avoid, &crossings);
+    done = crossings == 0;
+    if (st >= 0 && done && count && distance <= fmax(tolerance, info->distance_max)) {
+      mesh_surface was = *surface;
+      *surface = sharp;
+      sharp = was;
       info->crease_vertices = count;
       info->distance_max = distance;
     }
-    if (st >= 0 && !better) {
-      mesh_surface keep = *surface;
-      *surface = smooth;
-      smooth = keep;
-    }
+    mesh_surface_free(&sharp);
   }
-  mesh_surface_free(&smooth);
+  batten_free(sampler->ctx, avoid);
   return st;
 }
 

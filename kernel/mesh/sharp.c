@@ -3,12 +3,12 @@
  * contouring of Hermite data").
  *
  * All vertices of the even mesh lie on f = 0, so that its triangles chamfer a crease. Edges whose ends have normals
- * that differ by more than the angle may cross one. Where they do is found with planes from both sides (crease.c), and
- * there they are split: the new vertices of a triangle with two such edges are joined by an edge that follows the
- * crease. A triangle with three of them has a corner, which goes between the three new vertices. A triangle over whose
- * corners the gradient turns but whose edges cross no crease may have a tip, as that of a cone. What is no crease, or
- * none that is found safely, stays as it was. Rounds of improvement that keep to the creases (improve.c) follow, and
- * all is tried once more where their ends lie apart. */
+ * that differ by more than the angle may cross one. Where they do is found with planes from both sides (crease.c),
+ * and there they are split: the new vertices of a triangle with two such edges are joined by an edge that follows the
+ * crease. A triangle with three of them has a corner, which goes between the three new vertices. A triangle over
+ * whose corners the gradient turns but whose edges cross no crease may have a tip, as that of a cone. What is no
+ * crease, or none that is found safely, stays as it was. Rounds of improvement that keep to the creases (improve.c)
+ * follow, and all is tried once more where their ends lie apart. */
 #include "sharp.h"
 
 #include "base/checked.h"
@@ -18,9 +18,10 @@
 
 #include <string.h>
 
-static const double CANDIDATE = 0.7; /* of the angle: between the normals at the ends of an edge */
+static const double CANDIDATE = 0.7;                 /* of the angle: between the normals at the ends of an edge */
+static const double AVOID = 3;                       /* edges around places that could not be made sharp */
 static const double FAN_REACH = 2, FAN_FACING = 0.8; /* around tips: edges, and a cosine that asks for a turn */
-static const double MERGE = 0.1;     /* corners nearer than so many edges are one */
+static const double MERGE = 0.1;                     /* corners nearer than so many edges are one */
 
 enum { PASSES = 3, ROUNDS_FIRST = 4, ROUNDS_LATER = 2, FAN_MAX = 12 };
 
@@ -70,7 +71,8 @@ static bool crease_at(const mesh_surface *s, uint32_t v, double share, batten_cr
     for (unsigned k = 0; k < 3; k++) c->home[side][k] += c->x[k];
   }
   if (!boundary) {
-    const double *p = point(s, s->origin[mesh_next(ring[ends[0]])]), *q = point(s, s->origin[mesh_next(ring[ends[1]])]);
+    const double *p = point(s, s->origin[mesh_next(ring[ends[0]])]),
+                 *q = point(s, s->origin[mesh_next(ring[ends[1]])]);
     for (unsigned k = 0; k < 3; k++) c->x[k] += share * (0.5 * (p[k] + q[k]) - c->x[k]);
   }
   return true;
@@ -106,6 +108,8 @@ typedef struct sharpener {
   mesh_surface *s;
   batten_sampler *sampler;
   double edge, angle;
+  const double *avoid; /* [avoid_count][3] places to leave as they are */
+  size_t avoid_count;
   size_t crossing_count, centre_count, link_count;
   uint32_t *crossing_of;    /* [3 T] number of the crossing at a half-edge, or MESH_NONE */
   batten_crease *crossings; /* of creases and edges */
@@ -132,8 +136,8 @@ static batten_status take_normals(mesh_surface *s, batten_sampler *sampler) {
   batten_context *ctx = s->ctx;
   double *values = batten_alloc_array(ctx, s->vertex_count, sizeof *values);
   double *gradients = values ? batten_alloc_array(ctx, s->vertex_count, 3 * sizeof *gradients) : NULL;
-  batten_status st = gradients ? batten_sampler_gradients(sampler, s->vertex_count, s->points, values, gradients)
-                               : BATTEN_E_NOMEM;
+  batten_status st =
+      gradients ? batten_sampler_gradients(sampler, s->vertex_count, s->points, values, gradients) : BATTEN_E_NOMEM;
   for (uint32_t v = 0; st >= 0 && v < s->vertex_count; v++) {
     double n[3];
     if (is_marked(s, v)) continue;
@@ -149,7 +153,10 @@ static bool may_cross(const sharpener *w, uint32_t h) {
   const mesh_surface *s = w->s;
   uint32_t a = s->origin[h], b = s->origin[mesh_next(h)], g = s->twin[h];
   if ((g != MESH_NONE && g < h) || is_marked(s, a) || is_marked(s, b)) return false;
-  return vec_dot(normal(s, a), normal(s, b)) < cos(CANDIDATE * w->angle);
+  if (!(vec_dot(normal(s, a), normal(s, b)) < cos(CANDIDATE * w->angle))) return false;
+  for (size_t i = 0; i < w->avoid_count; i++)
+    if (vec_distance(point(s, a), w->avoid + 3 * i) < AVOID * w->edge) return false;
+  return true;
 }
 
 static batten_status find_crossings(sharpener *w) {
@@ -406,16 +413,16 @@ static void join_links(sharpener *w) {
   }
 }
 
-/* Ends of creases that are neighbours belong to one; corners that were found twice become one. */
-static void tidy(sharpener *w) {
-  mesh_surface *s = w->s;
+/* Ends of creases that are neighbours belong to one; places that were found twice become one. */
+static void tidy(mesh_surface *s, double edge, double angle) {
   for (uint32_t h = 0; h < 3 * s->triangle_count; h++) {
     uint32_t a = s->origin[h];
     if (a == MESH_NONE) continue;
     uint32_t b = s->origin[mesh_next(h)];
-    if ((s->faces[a] & s->faces[b] & MESH_CORNER) && vec_distance(point(s, a), point(s, b)) < MERGE * w->edge &&
-        mesh_surface_may_collapse(s, h))
-      mesh_surface_collapse(s, h);
+    bool one = is_marked(s, a) && is_marked(s, b) && vec_distance(point(s, a), point(s, b)) < MERGE * edge;
+    if (!one || ((s->faces[a] & ~s->faces[b]) && s->faces[a] != MESH_MARKS)) continue;
+    if ((s->faces[a] & MESH_CORNER) && !(s->faces[b] & MESH_CORNER)) continue;
+    if (mesh_surface_may_collapse(s, h)) mesh_surface_collapse(s, h);
   }
   for (uint32_t h = 0; h < 3 * s->triangle_count; h++) {
     uint32_t a = s->origin[h], g = s->twin[h];
@@ -426,7 +433,7 @@ static void tidy(sharpener *w) {
     double left[3], right[3];
     vec_triangle_normal(point(s, a), point(s, b), point(s, s->origin[mesh_previous(h)]), left);
     vec_triangle_normal(point(s, b), point(s, a), point(s, s->origin[mesh_previous(g)]), right);
-    if (vec_normalize(left) && vec_normalize(right) && vec_dot(left, right) < cos(w->angle)) make_sharp(s, a, b);
+    if (vec_normalize(left) && vec_normalize(right) && vec_dot(left, right) < cos(angle)) make_sharp(s, a, b);
   }
   for (uint32_t v = 0; v < s->vertex_count; v++)
     if (s->out[v] != MESH_NONE && (s->faces[v] & MESH_MARKS) == MESH_CREASE && mesh_surface_sharp_count(s, v) == 0)
@@ -434,8 +441,10 @@ static void tidy(sharpener *w) {
 }
 
 /* One pass over the compacted surface: *found is the number of places where creases were put into the mesh. */
-static batten_status insert(mesh_surface *s, batten_sampler *sampler, double edge, double angle, size_t *found) {
-  sharpener w = {.s = s, .sampler = sampler, .edge = edge, .angle = angle};
+static batten_status insert(mesh_surface *s, batten_sampler *sampler, double edge, double angle, size_t avoid_count,
+                            const double *avoid, size_t *found) {
+  sharpener w = {
+      .s = s, .sampler = sampler, .edge = edge, .angle = angle, .avoid = avoid, .avoid_count = avoid_count};
   *found = 0;
   batten_status st = take_normals(s, sampler);
   if (st >= 0) st = find_crossings(&w);
@@ -447,21 +456,24 @@ static batten_status insert(mesh_surface *s, batten_sampler *sampler, double edg
     if (st >= 0) open_centres(&w);
     if (st >= 0) join_links(&w);
     if (st >= 0) st = poke_centres(&w);
-    if (st >= 0) tidy(&w);
+    if (st >= 0) tidy(s, edge, angle);
   }
   sharpener_free(&w);
   return st;
 }
 
 batten_status mesh_surface_sharpen(mesh_surface *s, batten_sampler *sampler, const double *lower, const double *upper,
-                                   double edge, double angle, size_t *count) {
+                                   double edge, double angle, size_t avoid_count, const double *avoid,
+                                   size_t *count) {
   batten_status st = batten_progress(s->ctx, "sharpen", 0);
   *count = 0;
   for (int pass = 0; st >= 0 && pass < PASSES; pass++) {
     size_t found;
-    st = insert(s, sampler, edge, angle, &found);
+    st = insert(s, sampler, edge, angle, avoid_count, avoid, &found);
     if (st < 0 || found == 0) break;
     st = mesh_surface_improve_creased(s, sampler, lower, upper, edge, angle, pass == 0 ? ROUNDS_FIRST : ROUNDS_LATER);
+    if (st >= 0) tidy(s, edge, angle);
+    if (st >= 0) st = mesh_surface_compact(s);
   }
   for (uint32_t v = 0; st >= 0 && v < s->vertex_count; v++) *count += is_marked(s, v);
   return st;

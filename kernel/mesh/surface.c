@@ -248,9 +248,9 @@ uint32_t mesh_surface_poke(mesh_surface *s, uint32_t t, const double *x) {
   }
   s->origin[h + 2] = m;
   s->sharp[h + 1] = s->sharp[h + 2] = 0;
-  set_twins(s, h + 1, n + 2);     /* b -> m and m -> b */
-  set_twins(s, n + 1, n + 5);     /* c -> m and m -> c */
-  set_twins(s, n + 4, h + 2);     /* a -> m and m -> a */
+  set_twins(s, h + 1, n + 2); /* b -> m and m -> b */
+  set_twins(s, n + 1, n + 5); /* c -> m and m -> c */
+  set_twins(s, n + 4, h + 2); /* a -> m and m -> a */
   s->out[m] = h + 2;
   return m;
 }
