@@ -21,7 +21,6 @@ check "and its picture" test -s scene.png
 is scene_report.json status ok
 is scene_report.json nodes 6
 is scene_report.json mesh_components 1
-holds scene_report.json crease_vertices 'x > 20'
 is scene_report.json mesh_closed True
 is scene_report.json mesh_manifold True
 is scene_report.json mesh_self_intersections 0
@@ -41,6 +40,7 @@ run 2 "no scene" frep
 run 2 "unknown option '--cells'; did you mean '--cell'?" frep scene.json --cells 1
 run 2 "x.step: unknown extension for -o" frep scene.json -o x.step
 run 2 "--box: '1,2' is not the 6 numbers of two corners" frep scene.json --box 1,2
+run 2 "--sharp: 5; give 15 to 170 degrees, or 0" frep scene.json --sharp 5
 run 1 "none.json" frep none.json
 scene '"nodes": {"a": {"node": "negation", "a": "b"}, "b": {"node": "negation", "a": "a"}}, "root": "a"' >cycle.json
 run 1 "cycle.json: " frep cycle.json
@@ -76,6 +76,14 @@ nothing_new "after all failures"
 near() { # near FILE KEY VALUE PART
   holds "$1" "$2" "x > $3 * (1 - $4) && x < $3 * (1 + $4)"
 }
+scene '"root": {"node": "box", "center": [0, 0, 0], "half_extents": [1, 1, 0.5]}' >box.json
+run 0 "" frep box.json --cell 0.1 --quiet --report r.json
+near r.json volume 4 1e-9
+near r.json area 16 1e-9
+holds r.json crease_vertices 'x > 150'
+run 0 "" frep box.json --cell 0.1 --sharp 0 --quiet --report r.json
+is r.json crease_vertices 0
+holds r.json volume 'x < 3.99'
 scene "\"root\": {\"node\": \"offset\", \"distance\": 0.5, \"a\": $ball}" >offset.json
 run 0 "" frep offset.json --quiet --report r.json
 near r.json volume 14.13717 0.002

@@ -74,7 +74,7 @@ static double shape_cone(const double *x, double *g) {
 /* Point number i of count on the solid's creases; false beyond the last. */
 typedef bool (*crease_function)(size_t i, double *u);
 
-enum { ON_EDGE = 23, ON_CIRCLE = 97 };
+enum { ON_EDGE = 11, ON_CIRCLE = 49 };
 
 static bool cube_crease(size_t i, double *u) {
   size_t edge = i / ON_EDGE, axis = edge / 4;
