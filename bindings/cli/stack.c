@@ -44,7 +44,8 @@ static const cli_option table[] = {
      "points (in no order: carrier, check, cure) or carrier (the carrier alone); default\n"
      "pairs, with --points points"},
     {"tolerance", OPT_TOLERANCE, "T",
-     "how far sections may miss their points; default a tenth of the distance of\nneighbouring points"},
+     "how far sections may miss their points; default a tenth of the distance of\nneighbouring points, at most a "
+     "thousandth of the sections' size"},
     {"pair-distance", OPT_PAIR_DISTANCE, "P",
      "of centres beside the curve over the distance of points, to 1; default 0.75"},
     {"min-area", OPT_MIN_AREA, "A", "smaller contours are left out and told; default a quarter of a spacing squared"},
@@ -229,6 +230,7 @@ static size_t count_numbers(const char *text) {
 static batten_status read_sections(stack_work *w) {
   double start = batten_now();
   batten_status st = batten_read_sections(w->run.ctx, w->request->common.input, &w->request->read, &w->set);
+  if (w->set.deck_count) w->request->options.apex = 1; /* stems of hulls */
   w->time_read_s = batten_now() - start;
   return st;
 }

@@ -38,25 +38,41 @@ static bool has_two_points(const offset *p, size_t count) {
   return false;
 }
 
-batten_status bx_arrange_offsets(bx_reader *r, size_t count, const double *rows, size_t width, size_t *order,
-                                 size_t *starts, size_t *sections) {
+/* The lowest and the highest row of one station that lies on the middle plane, in order; how many rows: one, if they
+ * are one place. 0: it does not lie there. */
+static size_t take_stem(const offset *p, size_t count, size_t *order) {
+  for (size_t i = 0; i < count; i++)
+    if (!is_middle(&p[i])) return 0;
+  order[0] = p[0].row;
+  order[1] = p[count - 1].row;
+  return p[count - 1].waterline > p[0].waterline ? 2 : 1;
+}
+
+batten_status bx_arrange_offsets(bx_reader *r, bool stems, size_t count, const double *rows, size_t width,
+                                 size_t *order, size_t *starts, size_t *sections) {
   offset *all = batten_alloc_array(r->ctx, count, sizeof *all);
   if (!all) return BATTEN_E_NOMEM;
   for (size_t i = 0; i < count; i++) all[i] = (offset){rows[i * width], rows[i * width + 1], rows[i * width + 2], i};
   qsort(all, count, sizeof *all, compare);
-  size_t used = 0, made = 0;
+  size_t used = 0, made = 0, breadths = 0;
   for (size_t from = 0, to; from < count; from = to) {
     to = from + 1;
     while (to < count && all[to].station == all[from].station) to++;
-    size_t points = to - from;
+    size_t points = to - from, line[2], stem = take_stem(all + from, points, line);
+    if (stems && stem && (from == 0 || to == count)) {
+      starts[made++] = used;
+      for (size_t i = 0; i < stem; i++) order[used++] = line[i];
+      continue;
+    }
     const offset *p = trim(all + from, &points);
     if (!has_two_points(p, points)) continue;
+    breadths++;
     starts[made++] = used;
     for (size_t i = 0; i < points; i++) order[used++] = p[i].row;
   }
   starts[made] = used;
   batten_free(r->ctx, all);
-  if (made == 0)
+  if (breadths == 0)
     return batten_fail(r->ctx, BATTEN_E_FORMAT,
                        "%s: offsets: no station has two different points with a half-breadth between them; check the "
                        "columns of stations, waterlines and half-breadths",

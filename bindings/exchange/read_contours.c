@@ -221,7 +221,7 @@ static batten_status take_points(const sequences *s, const size_t *order, batten
   return st;
 }
 
-static batten_status finish(const sequences *s, batten_contours *out) {
+static batten_status finish(const sequences *s, bool stems, batten_contours *out) {
   const bx_table *t = &s->table;
   batten_contours c = {.count = s->contours};
   batten_status st = BATTEN_E_NOMEM;
@@ -230,7 +230,7 @@ static batten_status finish(const sequences *s, batten_contours *out) {
   if (!order || !c.starts) goto done;
   st = BATTEN_OK;
   if (t->offsets)
-    st = bx_arrange_offsets(t->r, s->count, s->rows, s->width, order, c.starts, &c.count);
+    st = bx_arrange_offsets(t->r, stems, s->count, s->rows, s->width, order, c.starts, &c.count);
   else
     sort_rows(s, order, c.starts);
   if (st == BATTEN_OK) st = take_points(s, order, &c);
@@ -246,7 +246,7 @@ done:
   return st;
 }
 
-batten_status bx_parse_contours(bx_reader *r, batten_contours *out, bool *offsets) {
+batten_status bx_parse_contours(bx_reader *r, bool stems, batten_contours *out, bool *offsets) {
   sequences s = {.ctx = r->ctx,
                  .names = {.ctx = r->ctx},
                  .table = {.r = r,
@@ -264,7 +264,7 @@ batten_status bx_parse_contours(bx_reader *r, batten_contours *out, bool *offset
   if (st == BATTEN_OK && s.count == 0)
     st = batten_fail(r->ctx, BATTEN_E_FORMAT, "%s: no points in the file", bx_short_path(r->path));
   if (st == BATTEN_OK) st = join_surfaces(&s);
-  if (st == BATTEN_OK) st = finish(&s, out);
+  if (st == BATTEN_OK) st = finish(&s, stems, out);
   *offsets = s.table.offsets;
   free_sequences(&s);
   return st;
@@ -272,7 +272,7 @@ batten_status bx_parse_contours(bx_reader *r, batten_contours *out, bool *offset
 
 batten_status bx_read_contours_from(bx_reader *r, batten_contours *out) {
   bool offsets;
-  return bx_parse_contours(r, out, &offsets);
+  return bx_parse_contours(r, false, out, &offsets);
 }
 
 batten_status batten_read_contours(batten_context *ctx, const char *path, batten_contours *out) {

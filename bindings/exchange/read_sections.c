@@ -65,7 +65,7 @@ static batten_status stack_planar(bx_reader *r, const batten_contours *c, double
 static batten_status read_contours(bx_reader *r, double gap, batten_section_set *out) {
   batten_contours c = {0};
   bool offsets;
-  batten_status st = bx_parse_contours(r, &c, &offsets);
+  batten_status st = bx_parse_contours(r, true, &c, &offsets);
   if (st != BATTEN_OK) return st;
   if (offsets)
     st = bx_stack_offsets(r->ctx, r->path, &c, out);

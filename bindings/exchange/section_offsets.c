@@ -4,7 +4,8 @@
  * Runs of positive half-breadths, with the zeros beside them, are contours: a bulb and the bow above it are two.
  * Where they share a zero they would touch, which sections must not; both end a little before it. A run that is open
  * at its upper end goes on straight for two waterlines and is closed there: the side keeps its slope up to the deck,
- * at which the caller cuts. */
+ * at which the caller cuts. A first or last station that lies on the middle plane is a stem: a point or a line, in
+ * which the solid ends; it goes up as far as the section beside it. */
 #include "contours.h"
 #include "sections.h"
 
@@ -72,14 +73,50 @@ static size_t mirror(const double (*side)[2], const run *r, const run *before, c
   return count;
 }
 
+static void set_frame(const batten_plane *p, batten_section *out) {
+  for (int k = 0; k < 3; k++) {
+    out->origin[k] = p->origin[k];
+    out->rotation[0][k] = p->axes[0][k];
+    out->rotation[1][k] = p->axes[1][k];
+    out->rotation[2][k] = k == 0; /* stations ascend along x */
+  }
+}
+
+/* The points of a stem; `beside` is the section next to it. */
+static batten_status make_stem(batten_context *ctx, size_t count, const double (*side)[2], const batten_contours *c,
+                               size_t beside, batten_section *out) {
+  const double(*next)[2] = (const double(*)[2])c->points + c->starts[beside];
+  size_t next_count = c->starts[beside + 1] - c->starts[beside], at = 0;
+  double bottom = side[0][1], top = side[count - 1][1];
+  batten_status st = bx_section_make(ctx, 1, 2, out);
+  if (st != BATTEN_OK) return st;
+  run r;
+  while (next_run(next, next_count, &at, &r))
+    if (at == next_count && is_open_above(next, &r) && !(top < next[r.to - 1][1])) {
+      double end[2];
+      go_on(next, &r, end);
+      top = end[1];
+    }
+  double *to = bx_section_points(out);
+  to[0] = to[2] = 0;
+  to[1] = bottom;
+  to[3] = top;
+  bx_section_starts(out)[0] = 0;
+  bx_section_starts(out)[1] = top > bottom ? 2 : 1;
+  return BATTEN_OK;
+}
+
 static batten_status make_section(batten_context *ctx, const batten_contours *c, size_t station,
                                   batten_section *out) {
   const double(*side)[2] = (const double(*)[2])c->points + c->starts[station];
   size_t count = c->starts[station + 1] - c->starts[station], runs = 0, at = 0, points = 0;
   run r;
   while (next_run(side, count, &at, &r)) runs++;
-  batten_status st = bx_section_make(ctx, runs, 4 * count + 2 * runs, out);
+  batten_status st = runs ? bx_section_make(ctx, runs, 4 * count + 2 * runs, out)
+                          : make_stem(ctx, count, side, c, station ? station - 1 : 1, out);
   if (st != BATTEN_OK) return st;
+  set_frame(&c->planes[station], out);
+  if (runs == 0) return BATTEN_OK;
   size_t *starts = bx_section_starts(out);
   double(*to)[2] = (double(*)[2])bx_section_points(out);
   run before = {0}, after = {0};
@@ -93,13 +130,6 @@ static batten_status make_section(batten_context *ctx, const batten_contours *c,
     r = after;
   }
   starts[runs] = points;
-  const batten_plane *p = &c->planes[station];
-  for (int k = 0; k < 3; k++) {
-    out->origin[k] = p->origin[k];
-    out->rotation[0][k] = p->axes[0][k];
-    out->rotation[1][k] = p->axes[1][k];
-    out->rotation[2][k] = k == 0; /* stations ascend along x */
-  }
   return BATTEN_OK;
 }
 

@@ -22,7 +22,8 @@ static const double FRAME_TOLERANCE = 1e-6;
 /* Relative to the axes' length: frames are parallel; relative to the stack's size: planes coincide. */
 static const double PARALLEL_TOLERANCE = 1e-9, COINCIDE_TOLERANCE = 1e-9;
 /* Of the median distance of points; of the largest section. */
-static const double TOLERANCE_OF_SPACING = 0.1, TOLERANCE_OF_SIZE = 1e-4;
+static const double TOLERANCE_OF_SPACING = 0.1, TOLERANCE_OF_SIZE = 1e-4,
+                    TOLERANCE_OF_MEAN = 1e-3;
 
 typedef struct taking {
   batten_context *ctx;
@@ -417,15 +418,22 @@ static batten_status check_areas(const taking *t) {
 /* ---- entries ------------------------------------------------------------------------------------- */
 
 /* Where points are dense in some places alone, a share of their distance asks for more than the others can bear: long
- * straight edges would need a centre every few tolerances. */
+ * straight edges would need a centre every few tolerances. Few points for a large section, on the other hand, would
+ * allow a curve that bulges between them, always outwards where the loop is convex: by parts of a percent of the area.
+ */
 double stack_tolerance(const stack *s, const batten_stack_options *opt) {
   if (opt->tolerance > 0) return opt->tolerance;
-  double size = 0;
+  double size = 0, sum = 0, count = 0;
   for (size_t i = 0; i < s->count; i++) {
     const polygon_set *p = &s->sections[i].loops;
-    if (p->count > 0) size = fmax(size, hypot(p->upper[0] - p->lower[0], p->upper[1] - p->lower[1]));
+    if (p->count == 0) continue;
+    double diagonal = hypot(p->upper[0] - p->lower[0], p->upper[1] - p->lower[1]);
+    size = fmax(size, diagonal);
+    sum += diagonal;
+    count++;
   }
-  return fmax(TOLERANCE_OF_SPACING * s->spacing, TOLERANCE_OF_SIZE * size);
+  double most = count > 0 ? TOLERANCE_OF_MEAN * sum / count : INFINITY;
+  return fmax(fmin(TOLERANCE_OF_SPACING * s->spacing, most), TOLERANCE_OF_SIZE * size);
 }
 
 batten_status stack_take_sections(batten_context *ctx, size_t count, const batten_section *sections,

@@ -3,8 +3,8 @@
  *
  * A volume spline with r^2 ln r through points of the loops alone, under a carrier, fills concave parts with
  * phantoms; points in their order say more: which side is in, and how far away everything is. So a centre on a loop
- * (F = 0) comes with two beside it, which take the exact signed distance to the polygons, and sixteen far around keep
- * F down there.
+ * (F = 0) comes with two beside it, which take the exact signed distance to the polygons, and circles of them far
+ * around keep F down there.
  *
  * Not every vertex needs a centre, but leaving out those of a smooth stretch is no way to find which: an interpolant
  * bulges between centres far apart whatever the data are like. The choice is greedy: every twelfth place along a
@@ -26,19 +26,21 @@ enum {
   ROUNDS = 40,       /* 3 to 7 are usual */
   SIGN_ROUNDS = 8,
   CENTERS_MAX = 6000, /* of all: seconds and 150 MB; what is missed then, the proof tells */
-  FAR = 16,
+  FAR = 16,           /* places on each of */
+  FAR_CIRCLES = 2,
   SIGN_CELLS = 48
 };
-static const double PART = 0.9;       /* of the tolerance is aimed at, since other places than ours are judged */
-static const double STEP = 0.35;      /* of places, in edges ... */
-static const double STEP_MAX = 3.5;   /* ... and in tolerances */
-static const double APART = 1.25;     /* new places of a round, in edges ... */
-static const double APART_MAX = 40;   /* ... and in tolerances, for edges that are long beside it */
-static const double MEET = 0.05;      /* of its pair distance: a centre nearer than this to another is left out */
-static const double SLOPE_MIN = 0.3;  /* where F is flatter than this the miss counts as if it were not */
-static const double FAR_RADIUS = 2;   /* half diagonals of the box */
-static const double SIGN_SHIFT = 0.5; /* of the grid, in cells */
-static const double SIGN_NEAR = 1.25; /* of the places nearest to the loops, in tolerances */
+static const double PART = 0.9;      /* of the tolerance is aimed at, since other places than ours are judged */
+static const double STEP = 0.35;     /* of places, in edges ... */
+static const double STEP_MAX = 3.5;  /* ... and in tolerances */
+static const double APART = 1.25;    /* new places of a round, in edges ... */
+static const double APART_MAX = 40;  /* ... and in tolerances, for edges that are long beside it */
+static const double MEET = 0.05;     /* of its pair distance: a centre nearer than this to another is left out */
+static const double SLOPE_MIN = 0.3; /* where F is flatter than this the miss counts as if it were not */
+static const double FAR_RADII[FAR_CIRCLES] = {3, 30}; /* half diagonals of the box */
+static const double FAR_PART = 0.5;                   /* of the distance there */
+static const double SIGN_SHIFT = 0.5;                 /* of the grid, in cells */
+static const double SIGN_NEAR = 1.25;                 /* of the places nearest to the loops, in tolerances */
 
 typedef struct section_fit {
   batten_context *ctx;
@@ -116,15 +118,19 @@ static batten_status add_place(section_fit *s, size_t i) {
   return BATTEN_OK;
 }
 
+/* They keep F down far away, and leave it to the pairs near the loops: half of the distance three radii away is what
+ * these come to there by themselves. The whole distance, or a nearer circle, bends F about the loops, which shows
+ * between sections. Without the outer circle the spline's linear part, which a lean shape may turn up on one side,
+ * gets the upper hand a hundred radii away. */
 static batten_status add_far(section_fit *s) {
   const polygon_set *p = s->loops;
-  const double radius = FAR_RADIUS * 0.5 * hypot(p->upper[0] - p->lower[0], p->upper[1] - p->lower[1]);
-  batten_status st = reserve(s, FAR);
-  for (unsigned i = 0; st >= 0 && i < FAR; i++) {
-    double angle = 2 * 3.141592653589793 * i / FAR;
+  const double size = 0.5 * hypot(p->upper[0] - p->lower[0], p->upper[1] - p->lower[1]);
+  batten_status st = reserve(s, FAR * FAR_CIRCLES);
+  for (unsigned i = 0; st >= 0 && i < FAR * FAR_CIRCLES; i++) {
+    double angle = 2 * 3.141592653589793 * (i % FAR) / FAR, radius = FAR_RADII[i / FAR] * size;
     double x[2] = {0.5 * (p->lower[0] + p->upper[0]) + radius * cos(angle),
                    0.5 * (p->lower[1] + p->upper[1]) + radius * sin(angle)};
-    add(s, x, polygon_distance(p, x, NULL, NULL));
+    add(s, x, FAR_PART * polygon_distance(p, x, NULL, NULL));
   }
   return st;
 }

@@ -190,8 +190,8 @@ static void test_offsets(batten_context *ctx) {
                               "station,waterline,half_breadth\n10,0,0\n10,1,.5\n10,2,0\n10,3,1\n"
                               "0,0,2\n0,1,3\n5,0,2\n5,1,1.5\n20,0,0\n20,1,0\n15,1,0\n15,2,1\n15,3,0\n15,4,0\n",
                               0, 0);
-  T_CHECK(s.count == 4, "four stations: %zu", s.count);
-  if (s.count == 4) {
+  T_CHECK(s.count == 5, "four stations and a stem: %zu", s.count);
+  if (s.count == 5) {
     const batten_section *t = s.sections;
     T_CHECK(t[2].contour_count == 2 && t[2].starts[1] == 4 && t[2].starts[2] == 9 && t[2].origin[0] == 10 &&
                 !memcmp(t[2].points, bulb, sizeof bulb) && !memcmp(t[2].points + 8, bow, sizeof bow),
@@ -200,6 +200,8 @@ static void test_offsets(batten_context *ctx) {
             "a flat bottom; the side goes straight on");
     T_CHECK(t[1].starts[1] == 6 && !memcmp(t[1].points, inwards, sizeof inwards), "not to the middle");
     T_CHECK(t[3].starts[1] == 4, "one that is closed above stays so");
+    T_CHECK(t[4].contour_count == 1 && t[4].starts[1] == 2 && t[4].points[1] == 0 && t[4].points[3] == 1,
+            "the stem is a line from its lowest row to its highest");
     T_CHECK(frame_error(t) == 0 && t[0].rotation[2][0] == 1, "in planes across x");
     T_CHECK(s.deck_count == 3 && s.deck[0] == 0 && s.deck[1] == 1 && s.deck[4] == 10 && s.deck[5] == 3,
             "the deck has the %zu open ones", s.deck_count);
@@ -450,7 +452,7 @@ int main(void) {
   test_refused(ctx);
   test_failures(&s);
   check_real(ctx, "contours/rt_Heart.txt", 0, 33, 33);
-  check_real(ctx, "hulls/gunnerus_offsets.csv", 0, 63, 67);
+  check_real(ctx, "hulls/gunnerus_offsets.csv", 0, 64, 68);
   check_real(ctx, "vipss/torus_parallelcut.xyz", 1, 6, 6);
   check_real(ctx, "vipss/torus_crosscut_nonparallel.xyz", 1, 5, 5);
   scratch_close(&s);

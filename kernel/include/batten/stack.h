@@ -94,9 +94,10 @@ typedef struct batten_stack_options {
   /* sections */
   batten_section_method method;
   double tolerance;     /* how far a section's curve may miss its points, and how deep a wrong sign may lie; caller's
-                           unit. 0 = a tenth of the median distance between neighbouring points, and at least 1e-4
-                           of the diagonal of the largest section's box. A section takes 6000 centres at most: it is
-                           told as not certified if these do not do. Default 0. */
+                           unit. 0 = a tenth of the median distance between neighbouring points, or a thousandth of
+                           the sections' mean diagonal if that is less, and at least 1e-4 of the diagonal of the
+                           largest section's box. A section takes 6000 centres at most: it is told as not certified
+                           if these do not do. Default 0. */
   double pair_distance; /* of centres off the curve, over the local distance of points, in (0, 1]. Default 0.75. */
   double min_area;      /* smaller contours are dropped and noted. 0 = a quarter of the square of the median
                            distance between points. Default 0. */

@@ -288,7 +288,9 @@ typedef struct batten_section_set {
  *   contour, mirrored to both sides (a bulb and the bow above it are two; at a single row of 0 between them both end a
  *   twentieth of a waterline before it). One that is open above goes straight on for two waterlines' distances and is
  *   closed there; deck tells where it really ends, and the caller cuts there. A side that leans inwards goes on until
- *   half of its breadth is left at most.
+ *   half of its breadth is left at most. A first or last station of nothing but zeros is a section of one or two
+ *   points, from its lowest row to its highest (as far up as the section beside it, where that goes on): the stem, at
+ *   which batten_stack_build closes the solid with opt.apex.
  * Points in no order, with opt.points: sections of one "contour" each, in the planes that hold three points or more
  *   across one direction, or else six or more; all points must lie in such planes, to 2e-6 of their size.
  * .json (also .gz): {"batten": "sections", "version": 1, "sections": [{"origin": [3], "rotation": [3][3], "contours":
