@@ -33,6 +33,7 @@ static const char *const kind_names[] = {"branches",
 
 static inline void bend(kind *k, size_t count, scene_block block, size_t side) {
   stack_scene_block(&k->scene, &block, count, 0.2, side);
+  k->o.tolerance = 0.007; /* corners to the last take centres, and show nothing here */
 }
 
 /* k is at the place where it stays: options point into it. */

@@ -21,9 +21,8 @@ static const double COORDINATE_MAX = 1e150;
 static const double FRAME_TOLERANCE = 1e-6;
 /* Relative to the axes' length: frames are parallel; relative to the stack's size: planes coincide. */
 static const double PARALLEL_TOLERANCE = 1e-9, COINCIDE_TOLERANCE = 1e-9;
-/* Of the median distance of points; of the largest section. */
-static const double TOLERANCE_OF_SPACING = 0.1, TOLERANCE_OF_SIZE = 1e-4,
-                    TOLERANCE_OF_MEAN = 1e-3;
+/* Of the median distance of points; of the largest section; of the sections' mean size. */
+static const double TOLERANCE_OF_SPACING = 0.1, TOLERANCE_OF_SIZE = 1e-4, TOLERANCE_OF_MEAN = 1e-3;
 
 typedef struct taking {
   batten_context *ctx;

@@ -265,6 +265,7 @@ static void small_make(int which, kind *k) {
     k->o.apex = 1;
     k->o.method = BATTEN_SECTION_CARRIER;
   }
+  k->o.tolerance = 0.05; /* few centres: built once for every allocation */
   stack_scene_sections(&k->scene);
 }
 
