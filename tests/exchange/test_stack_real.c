@@ -329,7 +329,7 @@ static void compare(batten_context *ctx, const batten_solid *solid, const batten
                     double mean_most, double hausdorff_most) {
   batten_mesh_measures m = {0};
   double mean[2], most[2];
-  batten_mesh *mesh = surface_of(ctx, solid, 0.05, NULL, &m);
+  batten_mesh *mesh = surface_of(ctx, solid, 0.08, NULL, &m);
   if (!T_CHECK(mesh, "%s: has a surface", what)) return;
   mesh_distance(truth, batten_mesh_vertex_count(mesh), batten_mesh_vertices(mesh), &mean[0], &most[0]);
   mesh_distance(mesh, batten_mesh_vertex_count(truth), batten_mesh_vertices(truth), &mean[1], &most[1]);
