@@ -5,7 +5,7 @@
  * 1. A torus that leans by 45 degrees, 10, 30, 100 parallel slices: section functions, surface, the same by one
  *    spline in space (kernel r^3) through the same centres, which stops at CENTERS_MOST.
  * 2. The same on 1 and 2 threads of batten's own.
- * 3. Mean and largest distance of the surface's vertices from the true torus, for each blend.
+ * 3. Mean and largest distance of the surface's vertices from the true torus, for each blend; denser points.
  * 4. The paper's test function, 50 nodes on each of 10 .. 100 slices: root mean square at 469 random points, range
  *    normalised to [0, 8.4] as in the paper.
  *
@@ -18,6 +18,7 @@
 
 enum { CENTERS_MOST = 12000, REPEATS = 3 };
 static const double LEAN = SCENE_PI / 4;
+static const double COARSE = 0.1, FINE = 0.04; /* distances of neighbouring points */
 
 static batten_context *new_context(unsigned threads) {
   batten_context_options o = batten_context_options_default();
@@ -63,12 +64,13 @@ static void torus_distance(const batten_mesh *mesh, double end, timing *t) {
 }
 
 /* Fit and surface, medians of REPEATS (of one where repeats is false). */
-static timing measure(batten_context *ctx, size_t sections, const batten_stack_options *o, bool repeat) {
+static timing measure(batten_context *ctx, size_t sections, double spacing, const batten_stack_options *o,
+                      bool repeat) {
   stack_scene s = {0};
   timing t = {0};
   double fit[REPEATS], surface[REPEATS];
   size_t repeats = repeat ? REPEATS : 1;
-  stack_scene_leaning_torus(&s, LEAN, sections, 0.1);
+  stack_scene_leaning_torus(&s, LEAN, sections, spacing);
   const batten_section *given = stack_scene_sections(&s);
   for (size_t k = 0; k < repeats; k++) {
     batten_solid *solid = NULL;
@@ -116,9 +118,9 @@ static void run_times(batten_context *ctx, size_t most) {
   static const size_t counts[] = {10, 30, 100};
   for (size_t i = 0; i < 3 && counts[i] <= most; i++) {
     batten_stack_options o = batten_stack_options_default();
-    timing a = measure(ctx, counts[i], &o, true), b = {0};
+    timing a = measure(ctx, counts[i], COARSE, &o, true), b = {0};
     o.route = BATTEN_ROUTE_SPACE;
-    if (a.done && a.centers <= CENTERS_MOST) b = measure(ctx, counts[i], &o, false);
+    if (a.done && a.centers <= CENTERS_MOST) b = measure(ctx, counts[i], COARSE, &o, false);
     printf("| %zu | %zu | %.3f | %.2f |", counts[i], a.centers, a.fit, a.surface);
     if (b.done)
       printf(" %.2f | %.2f | %.0f |\n", b.fit, b.surface, b.fit / a.fit);
@@ -136,7 +138,7 @@ static void run_threads(size_t most) {
   batten_stack_options o = batten_stack_options_default();
   static const size_t counts[] = {10, 30, 100};
   for (size_t i = 0; i < 3 && counts[i] <= most; i++) {
-    timing a = measure(one, counts[i], &o, true), b = measure(two, counts[i], &o, true);
+    timing a = measure(one, counts[i], COARSE, &o, true), b = measure(two, counts[i], COARSE, &o, true);
     printf("| %zu | %.3f | %.3f | %.2f | %.2f | %.2f | %.2f |\n", counts[i], a.fit, b.fit, a.fit / b.fit, a.surface,
            b.surface, a.surface / b.surface);
     fflush(stdout);
@@ -167,7 +169,7 @@ static void run_torus(batten_context *ctx) {
     o.end_height[0] = o.end_height[1] = 0.5;
     printf("| %s |", ways[w].name);
     for (size_t i = 0; i < 3; i++) {
-      timing t = measure(ctx, counts[i], &o, false);
+      timing t = measure(ctx, counts[i], FINE, &o, false);
       printf(" %.5f / %.4f |", t.mean, t.most);
     }
     printf("\n");
