@@ -23,7 +23,7 @@ static const double TURN_MIN = 0.5;    /* cosine between a triangle's normals be
 static const double FACE_MIN = 0.2;    /* cosine between its normal and its corners' gradients */
 static const double QUALITY_MIN = 0.3; /* changes make no triangle worse than this, unless it was worse before */
 
-enum { FLIP_SWEEPS = 4, VALENCE_MAX = 12, SPLITS_MAX = 64 };
+enum { FLIP_SWEEPS = 4, VALENCE_MAX = 12 };
 
 typedef struct improver {
   mesh_surface *s;
@@ -33,6 +33,7 @@ typedef struct improver {
   double *target, *values, *gradients; /* [V][3], [V], [V][3] */
   size_t room;                         /* vertices that they hold */
   double angle;                        /* of creases, 0 = there are none */
+  size_t most;                         /* triangles: needles that are halved across give ever more needles */
 } improver;
 
 static double *point(const mesh_surface *s, uint32_t v) { return s->points + 3 * (size_t)v; }
@@ -86,8 +87,7 @@ static double edge_length(const mesh_surface *s, uint32_t h) {
 
 static batten_status split_long(improver *im) {
   mesh_surface *s = im->s;
-  size_t most = SPLITS_MAX * s->triangle_count; /* needles that are halved across give ever more needles */
-  for (uint32_t h = 0; h < 3 * s->triangle_count && s->triangle_count < most; h++) { /* halves come later in it */
+  for (uint32_t h = 0; h < 3 * s->triangle_count && s->triangle_count < im->most; h++) { /* halves come later in it */
     if (s->origin[h] == MESH_NONE || !(edge_length(s, h) > LONG_EDGE * im->edge)) continue;
     const double *a = point(s, s->origin[h]), *b = point(s, s->origin[mesh_next(h)]);
     double middle[3];
@@ -329,7 +329,7 @@ static batten_status improve_round(improver *im, bool on_field) {
 
 batten_status mesh_surface_improve(mesh_surface *s, batten_sampler *sampler, const double *lower, const double *upper,
                                    double edge, unsigned rounds) {
-  improver im = {.s = s, .sampler = sampler, .lower = lower, .upper = upper, .edge = edge};
+  improver im = {.s = s, .sampler = sampler, .lower = lower, .upper = upper, .edge = edge, .most = SIZE_MAX};
   batten_status st = BATTEN_OK;
   for (unsigned round = 0; st >= 0 && round < rounds; round++) {
     st = batten_progress(s->ctx, "improve", (double)round / rounds);
@@ -342,6 +342,7 @@ batten_status mesh_surface_improve(mesh_surface *s, batten_sampler *sampler, con
 batten_status mesh_surface_improve_creased(mesh_surface *s, batten_sampler *sampler, const double *lower,
                                            const double *upper, double edge, double angle, unsigned rounds) {
   improver im = {.s = s, .sampler = sampler, .lower = lower, .upper = upper, .edge = edge, .angle = angle};
+  im.most = 2 * s->triangle_count + 256;
   batten_status st = BATTEN_OK;
   for (unsigned round = 0; st >= 0 && round < rounds; round++) {
     st = batten_progress(s->ctx, "sharpen", (double)(round + 1) / (rounds + 1));

@@ -274,14 +274,13 @@ static batten_status attempt(batten_sampler *sampler, const batten_frame *frame,
   if (st >= 0) st = mesh_surface_improve(surface, sampler, frame->lower, frame->upper, edge, opt->improve);
   if (st >= 0) st = mesh_surface_settle(surface, sampler, edge, opt->accuracy * frame->diagonal, &info->distance_max);
   info->crease_vertices = 0;
-  if (st >= 0 && opt->sharp_deg > 0 && opt->improve > 0) st = sharpen(sampler, frame, edge, opt, surface, info);
   if (st >= 0) st = count_crossings(surface, &info->self_intersections);
   info->time_improve_s += batten_now() - start;
   return st;
 }
 
 /* A surface that crosses itself has parts too thin for the lattice: again with cubes of half the side, and at last
- * with shorter edges too. */
+ * with shorter edges too. Creases are followed on the surface that stays. */
 static batten_status make_surface(batten_sampler *sampler, const batten_frame *frame, size_t seed_count,
                                   const double *seeds, const batten_polygonize_options *opt, mesh_surface *surface,
                                   batten_polygonize_info *info) {
@@ -293,6 +292,11 @@ static batten_status make_surface(batten_sampler *sampler, const batten_frame *f
                  seeds, opt, surface, info);
     if (st < 0 || info->self_intersections == 0 || opt->improve == 0) break;
   }
+  if (st < 0 || opt->improve == 0 || !(opt->sharp_deg > 0)) return st;
+  double start = batten_now();
+  st = sharpen(sampler, frame, info->cell, opt, surface, info);
+  if (st >= 0) st = count_crossings(surface, &info->self_intersections);
+  info->time_improve_s += batten_now() - start;
   return st;
 }
 
