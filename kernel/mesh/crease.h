@@ -15,6 +15,7 @@ typedef struct batten_crease {
   unsigned sheets;     /* 2 or 3 */
   unsigned char faces; /* of the box, on which x stays */
   bool found;
+  bool settled; /* the turn is no kink, but narrow */
 } batten_crease;
 
 /* Sets x of an edge's crease (sheets = 2) from a = home[0] and b = home[1] in the sheets, on f = 0, and their

@@ -203,47 +203,56 @@ static batten_status count_crossings(const mesh_surface *s, size_t *pairs) {
   return batten_mesh_find_crossings(s->ctx, s->vertex_count, s->points, s->triangle_count, s->origin, NULL, pairs);
 }
 
-/* Corners of triangles that cross others, to *avoid, of which there are *count then. */
-static batten_status add_crossings(const mesh_surface *s, size_t *count, double **avoid, size_t *pairs) {
+typedef struct avoided {
+  size_t count;
+  double *places; /* [count][3] */
+} avoided;
+
+/* Adds corners of triangles that cross others; *fresh: how many of them no crease was kept away from before. */
+static batten_status add_crossings(const mesh_surface *s, double edge, avoided *a, size_t *fresh) {
   batten_context *ctx = s->ctx;
-  size_t marked = 0;
+  size_t marked = 0, before = a->count, pairs = 0;
   unsigned char *marks = batten_alloc_array(ctx, s->triangle_count, 1);
   batten_status st =
-      marks ? batten_mesh_find_crossings(ctx, s->vertex_count, s->points, s->triangle_count, s->origin, marks, pairs)
+      marks ? batten_mesh_find_crossings(ctx, s->vertex_count, s->points, s->triangle_count, s->origin, marks, &pairs)
             : BATTEN_E_NOMEM;
-  for (size_t t = 0; st >= 0 && *pairs && t < s->triangle_count; t++) marked += marks[t];
-  if (marked) {
-    double *grown = batten_realloc_array(ctx, *avoid, *count + marked, 3 * sizeof *grown);
-    if (grown) *avoid = grown;
-    if (!grown) st = BATTEN_E_NOMEM;
-    for (size_t t = 0; grown && t < s->triangle_count; t++)
-      if (marks[t]) memcpy(grown + 3 * (*count)++, s->points + 3 * (size_t)s->origin[3 * t], 3 * sizeof *grown);
+  *fresh = 0;
+  for (size_t t = 0; st >= 0 && pairs && t < s->triangle_count; t++) marked += marks[t];
+  double *grown = marked ? batten_realloc_array(ctx, a->places, before + marked, 3 * sizeof *grown) : NULL;
+  if (marked && !grown) st = BATTEN_E_NOMEM;
+  if (grown) a->places = grown;
+  for (size_t t = 0; grown && t < s->triangle_count; t++) {
+    const double *x = s->points + 3 * (size_t)s->origin[3 * t];
+    if (!marks[t]) continue;
+    *fresh += !mesh_surface_avoids(x, edge, before, grown);
+    memcpy(grown + 3 * a->count++, x, 3 * sizeof *grown);
   }
   batten_free(ctx, marks);
   return st;
 }
 
 /* Makes the settled surface follow its creases. Where that makes it cross itself it is tried again without these
- * places; in the end, or where it misses the accuracy that it had, it stays as it was. */
+ * places; in the end, or where it misses the accuracy that it had, it stays as it was. Parts that are too thin for
+ * the mesh may cross without any crease near them. */
 static batten_status sharpen(batten_sampler *sampler, const batten_frame *frame, double edge,
                              const batten_polygonize_options *opt, mesh_surface *surface,
                              batten_polygonize_info *info) {
-  enum { TRIES = 3 };
-  double distance = 0, tolerance = opt->accuracy * frame->diagonal, *avoid = NULL;
-  size_t avoided = 0;
-  bool done = false;
+  enum { TRIES = 4 };
+  double distance = 0, tolerance = opt->accuracy * frame->diagonal;
+  avoided avoid = {0};
+  size_t fresh = 1;
   batten_status st = BATTEN_OK;
-  for (int attempt = 0; st >= 0 && !done && attempt < TRIES; attempt++) {
-    size_t count = 0, crossings = 0;
+  for (int attempt = 0; st >= 0 && fresh && attempt < TRIES; attempt++) {
+    size_t count = 0;
     mesh_surface sharp = {.ctx = sampler->ctx};
+    fresh = 0;
     st = mesh_surface_copy(surface, &sharp);
     if (st >= 0)
-      st = mesh_surface_sharpen(&sharp, sampler, frame->lower, frame->upper, edge, opt->sharp_deg * DEGREE, avoided,
-                                avoid, &count);
+      st = mesh_surface_sharpen(&sharp, sampler, frame->lower, frame->upper, edge, opt->sharp_deg * DEGREE,
+                                avoid.count, avoid.places, &count);
     if (st >= 0 && count) st = mesh_surface_settle(&sharp, sampler, edge, tolerance, &distance);
-    if (st >= 0 && count) st = add_crossings(&sharp, &avoided, &avoid, &crossings);
-    done = crossings == 0;
-    if (st >= 0 && done && count && distance <= fmax(tolerance, info->distance_max)) {
+    if (st >= 0 && count) st = add_crossings(&sharp, edge, &avoid, &fresh);
+    if (st >= 0 && !fresh && count && distance <= fmax(tolerance, info->distance_max)) {
       mesh_surface was = *surface;
       *surface = sharp;
       sharp = was;
@@ -252,7 +261,7 @@ static batten_status sharpen(batten_sampler *sampler, const batten_frame *frame,
     }
     mesh_surface_free(&sharp);
   }
-  batten_free(sampler->ctx, avoid);
+  batten_free(sampler->ctx, avoid.places);
   return st;
 }
 

@@ -149,14 +149,18 @@ static batten_status take_normals(mesh_surface *s, batten_sampler *sampler) {
   return st;
 }
 
+bool mesh_surface_avoids(const double *x, double edge, size_t count, const double *places) {
+  for (size_t i = 0; i < count; i++)
+    if (vec_distance(x, places + 3 * i) < AVOID * edge) return true;
+  return false;
+}
+
 static bool may_cross(const sharpener *w, uint32_t h) {
   const mesh_surface *s = w->s;
   uint32_t a = s->origin[h], b = s->origin[mesh_next(h)], g = s->twin[h];
   if ((g != MESH_NONE && g < h) || is_marked(s, a) || is_marked(s, b)) return false;
   if (!(vec_dot(normal(s, a), normal(s, b)) < cos(CANDIDATE * w->angle))) return false;
-  for (size_t i = 0; i < w->avoid_count; i++)
-    if (vec_distance(point(s, a), w->avoid + 3 * i) < AVOID * w->edge) return false;
-  return true;
+  return !mesh_surface_avoids(point(s, a), w->edge, w->avoid_count, w->avoid);
 }
 
 static batten_status find_crossings(sharpener *w) {

@@ -61,6 +61,17 @@ static double shape_r_half_ball(const double *x, double *g) {
   return a + b - r;
 }
 
+static double rounding; /* radius of shape_rounded's edge */
+
+/* The half ball with a round edge. */
+static double shape_rounded(const double *x, double *g) {
+  static const double down[3] = {0, 0, -1};
+  double ga[3], a = ball_at(x, 0, 0.8, ga), b = 0.3 - x[2], u = rounding - a, v = rounding - b, r = hypot(u, v);
+  if (!(u > 0 && v > 0)) return smaller(a, ga, b, down, g);
+  for (int k = 0; k < 3; k++) g[k] = (u * ga[k] + v * down[k]) / r;
+  return rounding - r;
+}
+
 /* Half angle 30 degrees, tip at z = 0.6, floor z = -0.6. */
 static double shape_cone(const double *x, double *g) {
   static const double up[3] = {0, 0, 1};
@@ -275,6 +286,31 @@ static void test_smooth(void) {
   }
 }
 
+/* An edge that is rounded within a small part of a mesh edge is followed as if it were sharp, on the surface; one
+ * that triangles can show is not. */
+static void test_rounded(void) {
+  const double cell = 0.08, tolerance = 1e-6;
+  for (int i = 0; i < 2; i++) {
+    rounding = cell * (i == 0 ? 0.02 : 1.5);
+    shape s = shape_make(shape_rounded);
+    size_t n = shape_seeds(&s, 0.95, 300, 5, seeds);
+    batten_polygonize_options o = shape_options(&s, 1.4, cell);
+    o.sharp_deg = 35;
+    polygonized p = polygonize(ctx, &s, &o, n, seeds);
+    polygonized_print(i == 0 ? "narrow" : "rounded", &p);
+    double worst = 0, u[3];
+    for (size_t k = 0; half_ball_crease(k, u); k++) worst = fmax(worst, mesh_distance(p.mesh, u));
+    T_RATIO(p.info.distance_max, tolerance, "rounded: vertices on the surface");
+    if (i == 0) {
+      T_CHECK(p.info.crease_vertices > 50, "narrow: %zu on creases", p.info.crease_vertices);
+      T_RATIO(worst, rounding + cell * cell / 2, "narrow: distance of creases");
+    } else {
+      T_CHECK(p.info.crease_vertices == 0, "rounded: %zu on creases", p.info.crease_vertices);
+    }
+    batten_mesh_free(p.mesh);
+  }
+}
+
 /* The cylinder cut by a box through its axis: the circles end on the box. */
 static void test_clipped(void) {
   shape s = shape_make(shape_cylinder);
@@ -335,6 +371,7 @@ int main(void) {
   ctx = t_context(NULL, NULL, 2);
   test_shapes();
   test_smooth();
+  test_rounded();
   test_clipped();
   test_invariance();
   T_CHECK(batten_bytes_in_use(ctx) == 0, "all released");

@@ -151,9 +151,10 @@ typedef struct batten_polygonize_options {
   unsigned improve; /* rounds of mesh improvement, each half an evaluation per vertex. 0 leaves the slivers of the
                        lattice, 4 make nearly all angles > 20 degrees. Default 8. */
   size_t evaluations_max; /* give up above so many field evaluations, 0 = none. Default 0. */
-  double sharp_deg; /* mesh edges follow creases of f = 0, kinks of f where normals turn by more than so many degrees,
-                       15 .. 170; vertices go to their corners and tips. Not with improve 0, and places where it is
-                       not safe stay as they are. 0: kinks are chamfered at the cell. Default 0. */
+  double sharp_deg; /* mesh edges follow creases of f = 0, where normals turn by more than so many degrees, 15 .. 170,
+                       at a kink of f or within a sixteenth of the cell; vertices go to their corners and tips. Not
+                       with improve 0, and places where it is not safe stay as they are. 0: creases are chamfered at
+                       the cell. Default 0. */
 } batten_polygonize_options;
 BATTEN_API batten_polygonize_options batten_polygonize_options_default(void);
 
