@@ -5,10 +5,9 @@
  * x minimises the squared distances to the planes and, among these points, the way from the last x (Kobbelt, Botsch,
  * Schwanecke, Seidel 2001, "Feature sensitive surface extraction from volume data"): by eigenvalues, those that are
  * near 0 left out. Curved sheets leave their planes by w^2, so that w may shrink with x. What turns smoothly, if
- * fast, is told from a kink by this: its normals come together as w shrinks. A turn within a sixteenth of an edge
- * counts as one all the same, since triangles cannot show it: the place is the last one at which the sheets lay
- * apart. Samples lie on the surface, since off it the gradients of some fields (R-functions, distances around edges)
- * belong to no sheet. */
+ * fast, is told from a kink by this: its normals come together as w shrinks. How far it shrank before is kept, with
+ * the place that was known then. Samples lie on the surface, since off it the gradients of some fields (R-functions,
+ * distances around edges) belong to no sheet. */
 #include "crease.h"
 
 #include "base/checked.h"
@@ -21,8 +20,6 @@
 static const double RANK_MIN = 0.01; /* eigenvalue over the largest: normals 12 degrees apart */
 static const double SAME_MIN = 0.7;  /* cosine between normals of a sheet in two rounds */
 static const double SHRINK = 0.25;   /* of w in a round */
-
-enum { ROUNDS = 4, ROUNDS_LEAST = 2 };
 
 /* Moves x to the nearest point, within the faces, on the planes (normal, through p); false unless they meet in a
  * point (three sheets) or a line. */
@@ -118,6 +115,13 @@ static bool add_sheet(batten_crease *c, double (*p)[3], const double *n, const d
   return true;
 }
 
+static bool bends(const batten_crease *c, double angle) {
+  double least = 1;
+  for (unsigned i = 0; i < c->sheets; i++)
+    for (unsigned j = 0; j < i; j++) least = fmin(least, vec_dot(c->normal[i], c->normal[j]));
+  return least <= cos(angle);
+}
+
 /* What samples at x + w aside tell; first: third sheets may come in. */
 static bool update(batten_crease *c, double w, const double *values, const double *gradients, double angle,
                    int round) {
@@ -141,15 +145,14 @@ static bool update(batten_crease *c, double w, const double *values, const doubl
     memcpy(p[i], q, sizeof q);
     memcpy(c->normal[i], n, sizeof n);
   }
-  double nearest = 1;
-  for (unsigned i = 0; i < c->sheets; i++)
-    for (unsigned j = 0; j < i; j++) nearest = fmin(nearest, vec_dot(c->normal[i], c->normal[j]));
-  if (nearest > cos(round + 1 < ROUNDS_LEAST ? 0.6 * angle : angle)) return false;
+  if (!bends(c, round == 0 ? 0.6 * angle : angle)) return false;
   memcpy(x, c->x, sizeof x);
   if (!meet(c, (const double(*)[3])p, x) || !(vec_distance(x, c->x) < (grown ? 8 : 4) * w)) return false;
   memcpy(c->x, x, sizeof x);
   return batten_crease_aside(c);
 }
+
+static bool is_refined(const batten_crease *c, unsigned char round) { return c->found && c->rounds == round; }
 
 batten_status batten_crease_refine(batten_sampler *sampler, size_t count, batten_crease *creases, double edge,
                                    double angle) {
@@ -163,24 +166,26 @@ batten_status batten_crease_refine(batten_sampler *sampler, size_t count, batten
       !(gradients = batten_alloc_array(ctx, count, 9 * sizeof *gradients)))
     goto done;
   st = BATTEN_OK;
-  for (int round = 0; st >= 0 && round < ROUNDS; round++) {
+  for (size_t j = 0; j < count; j++) creases[j].rounds = 0;
+  for (unsigned char round = 0; st >= 0 && round < BATTEN_CREASE_ROUNDS; round++) {
     size_t samples = 0;
     w *= SHRINK;
     for (size_t j = 0; j < count; j++)
-      for (unsigned i = 0; creases[j].found && !creases[j].settled && i < creases[j].sheets; i++, samples++)
+      for (unsigned i = 0; is_refined(creases + j, round) && i < creases[j].sheets; i++, samples++)
         for (unsigned k = 0; k < 3; k++) points[3 * samples + k] = creases[j].x[k] + w * creases[j].aside[i][k];
     st = batten_sampler_gradients(sampler, samples, points, values, gradients);
     samples = 0;
     for (size_t j = 0; st >= 0 && j < count; j++) {
       batten_crease *c = creases + j;
-      if (!c->found || c->settled) continue;
+      if (!is_refined(c, round)) continue;
       const batten_crease before = *c;
-      c->found = update(c, w, values + samples, gradients + 3 * samples, angle, round);
-      samples += before.sheets;
-      if (!c->found && round >= ROUNDS_LEAST) {
+      if (update(c, w, values + samples, gradients + 3 * samples, angle, round)) {
+        c->rounds++;
+      } else {
         *c = before;
-        c->settled = true;
+        c->found = round > 0 && bends(c, angle);
       }
+      samples += before.sheets;
     }
   }
 done:

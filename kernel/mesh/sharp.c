@@ -163,6 +163,41 @@ static bool may_cross(const sharpener *w, uint32_t h) {
   return !mesh_surface_avoids(point(s, a), w->edge, w->avoid_count, w->avoid);
 }
 
+/* Of a crease that is there. */
+static bool is_end(const mesh_surface *s, uint32_t v) {
+  return is_marked(s, v) && mesh_surface_sharp_count(s, v) == 1;
+}
+
+/* A turn that is not narrow counts where it goes on with one that is, from triangle to triangle. */
+static batten_status keep_continued(sharpener *w) {
+  mesh_surface *s = w->s;
+  size_t top = 0;
+  uint32_t *waiting = batten_alloc_array(s->ctx, w->crossing_count, sizeof *waiting); /* half-edges */
+  if (!waiting) return BATTEN_E_NOMEM;
+  for (uint32_t h = 0; h < 3 * s->triangle_count; h++) {
+    uint32_t i = w->crossing_of[h], g = s->twin[h];
+    if (i == MESH_NONE || !w->crossings[i].found || (g != MESH_NONE && g < h)) continue;
+    bool beside =
+        is_end(s, s->origin[mesh_previous(h)]) || (g != MESH_NONE && is_end(s, s->origin[mesh_previous(g)]));
+    if (beside) w->crossings[i].rounds = BATTEN_CREASE_ROUNDS;
+    if (w->crossings[i].rounds >= BATTEN_CREASE_NARROW) waiting[top++] = h;
+  }
+  while (top > 0) {
+    const uint32_t h = waiting[--top], sides[2] = {h, s->twin[h]};
+    for (int k = 0; k < 2 && sides[k] != MESH_NONE; k++)
+      for (uint32_t b = mesh_next(sides[k]); b != sides[k]; b = mesh_next(b)) {
+        uint32_t i = w->crossing_of[b];
+        if (i == MESH_NONE || !w->crossings[i].found || w->crossings[i].rounds >= BATTEN_CREASE_NARROW) continue;
+        w->crossings[i].rounds = BATTEN_CREASE_NARROW;
+        waiting[top++] = b;
+      }
+  }
+  for (size_t i = 0; i < w->crossing_count; i++)
+    if (w->crossings[i].rounds < BATTEN_CREASE_NARROW) w->crossings[i].found = false;
+  batten_free(s->ctx, waiting);
+  return BATTEN_OK;
+}
+
 static batten_status find_crossings(sharpener *w) {
   mesh_surface *s = w->s;
   size_t half_edges = 3 * s->triangle_count, count = 0;
@@ -193,7 +228,8 @@ static batten_status find_crossings(sharpener *w) {
     if (s->twin[h] != MESH_NONE) w->crossing_of[s->twin[h]] = next;
     next++;
   }
-  return batten_crease_refine(w->sampler, count, w->crossings, w->edge, w->angle);
+  batten_status st = batten_crease_refine(w->sampler, count, w->crossings, w->edge, w->angle);
+  return st < 0 ? st : keep_continued(w);
 }
 
 /* A corner or a tip within triangle t. */
@@ -296,6 +332,9 @@ static batten_status find_centres(sharpener *w) {
     return BATTEN_E_NOMEM;
   for (uint32_t t = 0; t < s->triangle_count; t++) take_triangle(w, t);
   batten_status st = batten_crease_refine(w->sampler, w->centre_count, w->centres, w->edge, w->angle);
+  for (size_t i = 0; i < w->centre_count; i++) /* tips; corners are where creases meet that are */
+    if (w->sites[i].corners[0] == MESH_NONE && w->centres[i].rounds < BATTEN_CREASE_NARROW)
+      w->centres[i].found = false;
   if (st >= 0) choose_tips(w);
   return st;
 }

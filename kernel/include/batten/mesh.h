@@ -152,9 +152,9 @@ typedef struct batten_polygonize_options {
                        lattice, 4 make nearly all angles > 20 degrees. Default 8. */
   size_t evaluations_max; /* give up above so many field evaluations, 0 = none. Default 0. */
   double sharp_deg; /* mesh edges follow creases of f = 0, where normals turn by more than so many degrees, 15 .. 170,
-                       at a kink of f or within a sixteenth of the cell; vertices go to their corners and tips. Not
-                       with improve 0, and places where it is not safe stay as they are. 0: creases are chamfered at
-                       the cell. Default 0. */
+                       at a kink of f or within a sixteenth of the cell (a quarter, along such a crease); vertices go
+                       to their corners and tips. Not with improve 0, and places where it is not safe stay as they
+                       are. 0: creases are chamfered at the cell. Default 0. */
 } batten_polygonize_options;
 BATTEN_API batten_polygonize_options batten_polygonize_options_default(void);
 
@@ -203,8 +203,8 @@ BATTEN_API batten_status batten_find_seeds(batten_context *ctx, const batten_fie
 
 typedef struct batten_outline batten_outline;
 /* As batten_polygonize in 2-D: evenly spaced polylines with the solid on their left, open ones (from box to box)
- * first. Without seeds as there. cell, lower, upper, accuracy, evaluations_max of opt count. Progress phases: "search"
- * (without seeds), "outline", "settle". */
+ * first. Without seeds as there. cell, lower, upper, accuracy, evaluations_max of opt count. Progress phases:
+ * "search" (without seeds), "outline", "settle". */
 BATTEN_API batten_status batten_trace_outline(batten_context *ctx, const batten_field *field, size_t seed_count,
                                               const double *seeds, const batten_polygonize_options *opt,
                                               batten_outline **out, batten_polygonize_info *info);
