@@ -32,14 +32,14 @@ static void far_places(const polygon_set *p, double *x) {
 }
 
 static batten_status find_wrong_signs(batten_context *ctx, const polygon_set *loops, const batten_solid *function,
-                                      size_t count, const double *x, double *depth) {
+                                      size_t count, const double *x, section_wrong *wrong) {
   double *f = batten_alloc_array(ctx, count, sizeof *f);
   batten_status st = f ? batten_solid_evaluate(ctx, function, count, x, f, NULL, NULL) : BATTEN_E_NOMEM;
   for (size_t i = 0; st >= 0 && i < count; i++) {
     bool inside = polygon_inside(loops, x + 2 * i);
-    if (isnan(f[i])) *depth = INFINITY;
     if (f[i] == 0 || inside == (f[i] > 0)) continue;
-    *depth = fmax(*depth, fabs(polygon_distance(loops, x + 2 * i, NULL, NULL)));
+    section_add_wrong(wrong, x + 2 * i,
+                      isnan(f[i]) ? INFINITY : fabs(polygon_distance(loops, x + 2 * i, NULL, NULL)));
   }
   batten_free(ctx, f);
   return st;
@@ -62,9 +62,11 @@ static batten_status find_miss(batten_context *ctx, const polygon_set *loops, co
 }
 
 batten_status section_certify(batten_context *ctx, const polygon_set *loops, const batten_solid *function,
-                              double tolerance, section_figures *figures) {
+                              double tolerance, section_figures *figures, section_wrong *wrong) {
   loop_places along = {0};
-  double *beside = NULL, *far = NULL, depth = 0, miss = 0;
+  section_wrong found = {0};
+  bool proven = false;
+  double *beside = NULL, *far = NULL, miss = 0;
   size_t count = 0;
   batten_status st = loop_places_make(ctx, loops, STEP, STEP_MAX * tolerance, &along);
   if (st < 0) goto done;
@@ -74,12 +76,15 @@ batten_status section_certify(batten_context *ctx, const polygon_set *loops, con
   far = batten_alloc_array(ctx, CIRCLES * DIRECTIONS, 2 * sizeof *far);
   if (!far) goto done;
   far_places(loops, far);
-  if ((st = find_wrong_signs(ctx, loops, function, count, beside, &depth)) < 0) goto done;
-  if ((st = find_wrong_signs(ctx, loops, function, CIRCLES * DIRECTIONS, far, &depth)) < 0) goto done;
+  if ((st = find_wrong_signs(ctx, loops, function, count, beside, &found)) < 0) goto done;
+  if ((st = find_wrong_signs(ctx, loops, function, CIRCLES * DIRECTIONS, far, &found)) < 0) goto done;
   if ((st = find_miss(ctx, loops, function, &miss)) < 0) goto done;
+  if (found.depth <= tolerance && (st = section_prove(ctx, loops, function, tolerance, &proven, &found)) < 0)
+    goto done;
   figures->residual_max = miss;
-  figures->wrong_sign_max = depth;
-  figures->certified = depth <= tolerance;
+  figures->wrong_sign_max = found.depth;
+  figures->certified = proven;
+  if (wrong) *wrong = found;
   st = BATTEN_OK;
 done:
   loop_places_free(ctx, &along);

@@ -4,7 +4,7 @@
  * in an arena of its own (base/arena.h) and leaves the numbers of the spline in a room that the calling thread took;
  * the calling thread makes the solids of them. How much an arena and a room must hold is a guess from the points and
  * the tolerance. What failed, for want of memory or for any other reason, is done again with the caller's context, so
- * that the guess decides about time alone, and errors have their text. Then the proofs, in the same way.
+ * that the guess decides about time alone, and errors have their text.
  *
  * Points in no order are fitted on the calling thread: their solids come with carriers of many kinds, and
  * batten_solid_fit has loops of its own on the threads. */
@@ -125,8 +125,8 @@ static void fit_task(void *arg, size_t worker) {
     section_room *room = &a->rooms[i - a->first];
     batten_context *own = has_loops(a, i) ? batten_arena_context(a->arenas[worker]) : NULL;
     batten_solid *solid = NULL;
-    if (own &&
-        section_fit_loops(own, &a->s->sections[i].loops, a->tolerance, a->pair_distance, &solid, &room->figures) >= 0)
+    if (own && section_fit_proven(own, &a->s->sections[i].loops, a->tolerance, a->pair_distance, &solid,
+                                  &room->figures) >= 0)
       leave(solid, room);
     batten_solid_free(solid);
   }
@@ -171,8 +171,8 @@ static batten_status collect(fit_all *a) {
     if (room->done)
       st = make_solid(a, room, &section->loops, &section->function);
     else
-      st = section_fit_loops(a->ctx, &section->loops, a->tolerance, a->pair_distance, &section->function,
-                             &a->figures[i]);
+      st = section_fit_proven(a->ctx, &section->loops, a->tolerance, a->pair_distance, &section->function,
+                              &a->figures[i]);
     if (st < 0) return name_section(a->ctx, i, st);
   }
   return BATTEN_OK;
@@ -187,43 +187,15 @@ static batten_status fit_wave(fit_all *a) {
   return st;
 }
 
-/* ---- proofs -------------------------------------------------------------------------------------- */
-
-static batten_status certify_one(fit_all *a, batten_context *ctx, size_t i) {
-  const stack_section *section = &a->s->sections[i];
-  return section_certify(ctx, &section->loops, section->function, a->tolerance, &a->figures[i]);
-}
-
-static void certify_task(void *arg, size_t worker) {
-  fit_all *a = arg;
-  for (size_t i; (i = atomic_fetch_add(&a->next, 1)) < a->last;) {
-    batten_context *own = has_loops(a, i) ? batten_arena_context(a->arenas[worker]) : NULL;
-    a->rooms[i - a->first].done = own && certify_one(a, own, i) >= 0;
-  }
-}
-
-static batten_status certify_wave(fit_all *a) {
-  batten_status st = BATTEN_OK;
-  a->rooms = batten_alloc_array(a->ctx, a->last - a->first, sizeof *a->rooms);
-  if (!a->rooms) return BATTEN_E_NOMEM;
-  for (size_t i = a->first; i < a->last; i++) a->rooms[i - a->first] = (section_room){0};
-  atomic_init(&a->next, a->first);
-  batten_parallel(a->ctx, a->workers, certify_task, a);
-  for (size_t i = a->first; st >= 0 && i < a->last; i++)
-    if (has_loops(a, i) && !a->rooms[i - a->first].done) st = name_section(a->ctx, i, certify_one(a, a->ctx, i));
-  free_rooms(a);
-  return st;
-}
-
 /* ---- the whole ----------------------------------------------------------------------------------- */
 
-static batten_status in_waves(fit_all *a, const char *phase, batten_status (*wave)(fit_all *)) {
+static batten_status in_waves(fit_all *a) {
   const size_t count = a->s->count, each = WAVE * (a->workers ? a->workers : 1);
   for (a->first = 0; a->first < count; a->first = a->last) {
-    batten_status st = batten_progress(a->ctx, phase, (double)a->first / (double)count);
+    batten_status st = batten_progress(a->ctx, "sections", (double)a->first / (double)count);
     if (st < 0) return st;
     a->last = count - a->first < each ? count : a->first + each;
-    if ((st = wave(a)) < 0) return st;
+    if ((st = fit_wave(a)) < 0) return st;
   }
   return BATTEN_OK;
 }
@@ -248,8 +220,7 @@ batten_status stack_fit_all(batten_context *ctx, stack *s, const batten_section 
   if (opt->method != BATTEN_SECTION_PAIRS) return fit_unordered(ctx, s, given, opt->method, figures);
   fit_all a = {.ctx = ctx, .s = s, .tolerance = tolerance, .pair_distance = opt->pair_distance, .figures = figures};
   batten_status st = take_arenas(&a);
-  if (st >= 0) st = in_waves(&a, "sections", fit_wave);
-  if (st >= 0) st = in_waves(&a, "certify", certify_wave);
+  if (st >= 0) st = in_waves(&a);
   while (a.workers > 0) batten_arena_free(ctx, a.arenas[--a.workers]);
   batten_free(ctx, a.arenas);
   return st;

@@ -36,12 +36,19 @@ static batten_stack_info tell(const stack *s, const batten_section *given, const
   return info;
 }
 
-static batten_status judge(batten_context *ctx, const section_figures *figures, double tolerance) {
+static batten_status judge(batten_context *ctx, const section_figures *figures, double tolerance, bool loops) {
   if (!figures->certified && figures->wrong_sign_max > tolerance)
     return batten_fail(ctx, BATTEN_W_AMBIGUOUS,
                        "section: its function has a wrong sign %.3g deep, above the tolerance %.3g; raise "
                        "opt.tolerance, or give more points where contours come near each other",
                        figures->wrong_sign_max, tolerance);
+  if (!figures->certified && loops)
+    return batten_fail(
+        ctx, BATTEN_W_AMBIGUOUS,
+        "section: the sign of its function is not proven everywhere, wrong signs were found %.3g deep, "
+        "the tolerance is %.3g; raise opt.tolerance, or give more points where contours come near each "
+        "other",
+        figures->wrong_sign_max, tolerance);
   if (!figures->certified)
     return batten_fail(
         ctx, BATTEN_W_AMBIGUOUS,
@@ -81,7 +88,7 @@ batten_status batten_section_fit(batten_context *ctx, const batten_section *sect
   }
   *out = s.sections[0].function;
   s.sections[0].function = NULL;
-  st = judge(ctx, &figures, tolerance);
+  st = judge(ctx, &figures, tolerance, s.sections[0].loops.count > 0);
 done:
   stack_release(&s);
   batten_free(ctx, notes.items);

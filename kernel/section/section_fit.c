@@ -28,6 +28,7 @@ enum {
   CENTERS_MAX = 6000, /* of all: seconds and 150 MB; what is missed then, the proof tells */
   FAR = 16,           /* places on each of */
   FAR_CIRCLES = 2,
+  REPAIRS = 5, /* fits after the first that the judge's places are given to */
   SIGN_CELLS = 48
 };
 static const double PART = 0.9;      /* of the tolerance is aimed at, since other places than ours are judged */
@@ -40,6 +41,7 @@ static const double SLOPE_MIN = 0.3; /* where F is flatter than this the miss co
 static const double FAR_RADII[FAR_CIRCLES] = {3, 30}; /* half diagonals of the box */
 static const double FAR_PART = 0.5;                   /* of the distance there */
 static const double SIGN_SHIFT = 0.5;                 /* of the grid, in cells */
+static const double HINT_PART = 0.9;                  /* of the tolerance: less deep signs are let be */
 static const double SIGN_NEAR = 1.25;                 /* of the places nearest to the loops, in tolerances */
 
 typedef struct section_fit {
@@ -318,17 +320,77 @@ static batten_status make_solid(section_fit *s, batten_solid **out) {
   return st;
 }
 
-batten_status section_fit_loops(batten_context *ctx, const polygon_set *loops, double tolerance, double pair_distance,
-                                batten_solid **out, section_figures *figures) {
+/* Places of wrong sign that others have found. */
+static batten_status follow_wrong(section_fit *s, const section_wrong *wrong) {
+  batten_status st = reserve(s, SECTION_WRONG_MAX);
+  const size_t before = s->count;
+  for (size_t i = 0; st >= 0 && wrong && i < wrong->count && !is_full(s); i++) {
+    const double *at = wrong->places[i];
+    if (isfinite(wrong->depths[i]) && !meets_another(s, at, MEET * wrong->depths[i]))
+      add(s, at, polygon_distance(s->loops, at, NULL, NULL));
+  }
+  return st < 0 || s->count == before ? st : follow_loops(s);
+}
+
+/* hints: of wrong signs, from earlier fits, or NULL. */
+static batten_status fit_loops(batten_context *ctx, const polygon_set *loops, double tolerance, double pair_distance,
+                               const section_wrong *hints, size_t hint_count, batten_solid **out,
+                               section_figures *figures) {
   section_fit s = {.ctx = ctx, .loops = loops, .tolerance = PART * tolerance, .pair_distance = pair_distance};
   batten_status st = open_fit(&s);
   if (st >= 0) st = add_first(&s);
   if (st >= 0) st = follow_loops(&s);
   if (st >= 0) st = follow_signs(&s);
+  for (size_t i = 0; st >= 0 && i < hint_count; i++) st = follow_wrong(&s, &hints[i]);
   if (st >= 0) st = make_solid(&s, out);
   if (st >= 0) *figures = (section_figures){.centers = s.count, .status = s.status};
   close_fit(&s);
   return st < 0 ? st : s.status;
+}
+
+batten_status section_fit_loops(batten_context *ctx, const polygon_set *loops, double tolerance, double pair_distance,
+                                batten_solid **out, section_figures *figures) {
+  return fit_loops(ctx, loops, tolerance, pair_distance, NULL, 0, out, figures);
+}
+
+/* What is worse than the tolerance, as far as it is known. */
+static void keep_deep(section_wrong *wrong, double depth) {
+  size_t kept = 0;
+  for (size_t i = 0; i < wrong->count; i++) {
+    if (!(wrong->depths[i] > depth)) continue;
+    memmove(wrong->places[kept], wrong->places[i], sizeof wrong->places[i]);
+    wrong->depths[kept++] = wrong->depths[i];
+  }
+  wrong->count = kept;
+}
+
+batten_status section_fit_proven(batten_context *ctx, const polygon_set *loops, double tolerance,
+                                 double pair_distance, batten_solid **out, section_figures *figures) {
+  section_wrong *hints = batten_alloc_array(ctx, REPAIRS + 1, sizeof *hints);
+  batten_solid *best = NULL;
+  batten_status st = hints ? BATTEN_OK : BATTEN_E_NOMEM;
+  for (size_t repair = 0; st >= 0 && repair <= REPAIRS; repair++) {
+    batten_solid *solid = NULL;
+    section_figures own;
+    st = fit_loops(ctx, loops, tolerance, pair_distance, hints, repair, &solid, &own);
+    if (st >= 0) st = section_certify(ctx, loops, solid, tolerance, &own, &hints[repair]);
+    if (st >= 0 && (!best || own.certified || own.wrong_sign_max < figures->wrong_sign_max)) {
+      batten_solid *worse = best;
+      best = solid;
+      solid = worse;
+      *figures = own;
+    }
+    batten_solid_free(solid);
+    if (st < 0 || own.certified) break;
+    keep_deep(&hints[repair], HINT_PART * tolerance);
+    if (hints[repair].count == 0) break;
+  }
+  batten_free(ctx, hints);
+  if (st < 0)
+    batten_solid_free(best);
+  else
+    *out = best;
+  return st < 0 ? st : figures->status;
 }
 
 batten_status section_fit_points(batten_context *ctx, batten_section_method method, size_t count,

@@ -9,6 +9,7 @@
  * section.c      batten_section_fit: the function of one section alone
  * places.c       places along the loops and beside them, for the fit and for the proof
  * certify.c      does a section's function have the sign of its polygons, and how far does it miss them
+ * prove.c        the sign, proven over boxes
  * components.c   outer loops with their holes, which overlap from section to section, pieces, notes
  * links.c        components without a partner joined in sheared frames
  * crossings.c    pairs of sections whose planes cross within both
@@ -97,13 +98,13 @@ batten_status stack_take_sections(batten_context *ctx, size_t count, const batte
 double stack_tolerance(const stack *s, const batten_stack_options *opt);
 void stack_release(stack *s); /* all that hangs on it, not s itself (release.c) */
 
-/* ---- section_fit.c, fit_all.c, certify.c ---------------------------------------------------------- */
+/* ---- section_fit.c, fit_all.c, certify.c, prove.c ---------------------------------------------------- */
 
 typedef struct section_figures {
   size_t centers;
   double residual_max;   /* of the curve against the polygon's points: |F| / |grad F| */
   double wrong_sign_max; /* deepest wrong sign */
-  bool certified;        /* wrong_sign_max <= tolerance, on the grid that certify.c says */
+  bool certified;        /* of loops: proven, see section_prove */
   batten_status status;  /* BATTEN_OK or a warning */
 } section_figures;
 
@@ -113,10 +114,32 @@ batten_status section_fit_loops(batten_context *ctx, const polygon_set *loops, d
 /* From points in no order, [count][2]: POINTS or CARRIER. */
 batten_status section_fit_points(batten_context *ctx, batten_section_method method, size_t count,
                                  const double *points, batten_solid **out, section_figures *figures);
-/* The proof, which knows nothing of the fit: the sign of F against even-odd over a grid (and far outside), and |F| /
- * |grad F| along the loops. Fills residual_max, wrong_sign_max, certified. */
+/* The same, proven by section_certify, whose figures are filled: as long as it finds places of wrong sign, and not too
+ * often, they become centres of another fit. The best of them is left. */
+batten_status section_fit_proven(batten_context *ctx, const polygon_set *loops, double tolerance,
+                                 double pair_distance, batten_solid **out, section_figures *figures);
+
+enum { SECTION_WRONG_MAX = 64 };
+/* Places at which F has a wrong sign or is too near to 0 for a proof, the deepest, most of them some way apart; count
+ * 0, depth 0 to begin with. */
+typedef struct section_wrong {
+  size_t count;
+  double depth; /* of the deepest wrong sign */
+  double places[SECTION_WRONG_MAX][2], depths[SECTION_WRONG_MAX];
+} section_wrong;
+void section_add_wrong(section_wrong *wrong, const double *x, double depth);
+
+/* The judge, which knows nothing of the fit. certified: section_prove says so. wrong_sign_max: the deepest wrong sign
+ * that was found, at a grid, at places beside the loops and far away, or by section_prove: never above the tolerance
+ * when certified, but it may be below it, when a box is not settled and nothing wrong is found in it. residual_max:
+ * |F| / |grad F| at the points of the loops. wrong (NULL: not wanted) is filled. */
 batten_status section_certify(batten_context *ctx, const polygon_set *loops, const batten_solid *function,
-                              double tolerance, section_figures *figures);
+                              double tolerance, section_figures *figures, section_wrong *wrong);
+/* *proven: F has, farther than 17/16 tolerances from the loops and out to 100 half diagonals along x and y, the sign of
+ * the signed distance: every box of a quadtree is settled by bounds of both; and no place was seen to be wrong that is
+ * deeper than the tolerance. Places seen to be wrong are added to wrong. False also where 400000 boxes do not do. */
+batten_status section_prove(batten_context *ctx, const polygon_set *loops, const batten_solid *function,
+                            double tolerance, bool *proven, section_wrong *wrong);
 /* All sections without apex; figures [count]. Errors name the section ("sections[3]: ..."). */
 batten_status stack_fit_all(batten_context *ctx, stack *s, const batten_section *given,
                             const batten_stack_options *opt, double tolerance, section_figures *figures);

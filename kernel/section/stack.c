@@ -288,7 +288,7 @@ static batten_status tell(batten_context *ctx, const batten_stack_info *info, ba
   if (info->certified < info->sections && info->route == BATTEN_ROUTE_SECTIONS && info->tolerance > 0)
     return batten_fail(
         ctx, BATTEN_W_AMBIGUOUS,
-        "sections: %zu of %zu are not certified, the sign is wrong up to %g deep, %g allowed; give more "
+        "sections: %zu of %zu are not certified, wrong signs were found up to %g deep, %g allowed; give more "
         "points there, or a larger opt.tolerance",
         info->sections - info->certified, info->sections, info->wrong_sign_max, info->tolerance);
   if (info->crossings && info->route == BATTEN_ROUTE_SECTIONS)

@@ -43,7 +43,7 @@ static fitted fit_first(batten_context *ctx, stack_scene *scene, double part) {
   fitted f = {.s = make_stack(ctx, scene)};
   f.tolerance = part * f.s.sections[0].loops.spacing;
   batten_status st =
-      section_fit_loops(ctx, &f.s.sections[0].loops, f.tolerance, 0.75, &f.s.sections[0].function, &f.figures);
+      section_fit_proven(ctx, &f.s.sections[0].loops, f.tolerance, 0.75, &f.s.sections[0].function, &f.figures);
   if (st < 0) T_CHECK(false, "fit: %s", batten_error(ctx));
   return f;
 }
@@ -94,7 +94,7 @@ static void test_disc(batten_context *ctx) {
     miss = fmax(miss, fabs(value_at(ctx, s, points[2 * i], points[2 * i + 1], NULL)));
   T_CHECK(count >= 8 && count < f.figures.centers / 2, "disc: %zu of the centres are points of the surface", count);
   T_RATIO(miss, 1e-10, "disc: F at these");
-  T_OK(section_certify(ctx, &f.s.sections[0].loops, s, f.tolerance, &f.figures), ctx);
+  T_OK(section_certify(ctx, &f.s.sections[0].loops, s, f.tolerance, &f.figures, NULL), ctx);
   T_CHECK(f.figures.certified, "disc: certified, miss %.3g, wrong sign %.3g of %.3g", f.figures.residual_max,
           f.figures.wrong_sign_max, f.tolerance);
   free_stack(&f.s);
@@ -130,7 +130,7 @@ static void test_shapes(batten_context *ctx) {
     double depth = deepest(ctx, f.s.sections[0].function, exact[shape], -20, 20);
     T_RATIO(depth, f.tolerance + sagitta, "%s: deepest wrong sign over a fine grid (%zu centres, %zu points)",
             names[shape], f.figures.centers, loops->starts[loops->count]);
-    T_OK(section_certify(ctx, loops, f.s.sections[0].function, f.tolerance, &f.figures), ctx);
+    T_OK(section_certify(ctx, loops, f.s.sections[0].function, f.tolerance, &f.figures, NULL), ctx);
     T_CHECK(f.figures.certified && f.figures.residual_max <= 1.05 * f.tolerance,
             "%s: certified, miss %.3g, wrong sign %.3g of %.3g", names[shape], f.figures.residual_max,
             f.figures.wrong_sign_max, f.tolerance);
@@ -159,7 +159,7 @@ static void test_awkward(batten_context *ctx) {
     if (shape == 3) stack_scene_disc(&scene, 0, 0, 10, 60), stack_scene_disc(&scene, 0, 0, 9.99, 60);
     if (shape == 4) stack_scene_disc(&scene, 0, 0, 10, 1500);
     fitted f = fit_first(ctx, &scene, shape == 0 ? 0.5 : 0.1);
-    T_OK(section_certify(ctx, &f.s.sections[0].loops, f.s.sections[0].function, f.tolerance, &f.figures), ctx);
+    T_OK(section_certify(ctx, &f.s.sections[0].loops, f.s.sections[0].function, f.tolerance, &f.figures, NULL), ctx);
     T_CHECK(f.figures.certified, "%s: certified, wrong sign %.3g of %.3g (%zu centres)", names[shape],
             f.figures.wrong_sign_max, f.tolerance, f.figures.centers);
     if (shape == 4) T_CHECK(f.figures.centers < 500, "dense points do not cost a centre each");
@@ -177,10 +177,10 @@ static void test_random(batten_context *ctx) {
   for (size_t i = 0; i < s.count; i++) {
     section_figures figures;
     double tolerance = 0.1 * s.sections[i].loops.spacing;
-    if (section_fit_loops(ctx, &s.sections[i].loops, tolerance, 0.75, &s.sections[i].function, &figures) < 0)
+    if (section_fit_proven(ctx, &s.sections[i].loops, tolerance, 0.75, &s.sections[i].function, &figures) < 0)
       continue;
     centers += figures.centers;
-    section_certify(ctx, &s.sections[i].loops, s.sections[i].function, tolerance, &figures);
+    section_certify(ctx, &s.sections[i].loops, s.sections[i].function, tolerance, &figures, NULL);
     certified += figures.certified;
     depth = fmax(depth, figures.wrong_sign_max / tolerance);
     miss = fmax(miss, figures.residual_max / tolerance);
@@ -231,7 +231,7 @@ static void test_proof(batten_context *ctx) {
   stack_scene_discs(&scene, 2, radii, 1, 80);
   fitted f = fit_first(ctx, &scene, 0.1);
   section_figures figures = {0};
-  T_OK(section_certify(ctx, &f.s.sections[1].loops, f.s.sections[0].function, f.tolerance, &figures), ctx);
+  T_OK(section_certify(ctx, &f.s.sections[1].loops, f.s.sections[0].function, f.tolerance, &figures, NULL), ctx);
   T_CHECK(!figures.certified, "a function of another disc is not certified");
   T_RATIO(fabs(figures.wrong_sign_max - 0.5), 0.5 + f.tolerance,
           "and its depth %.3g is told: up to 1 and the tolerance", figures.wrong_sign_max);
@@ -251,11 +251,11 @@ static void test_phantom(batten_context *ctx) {
   section_figures figures = {0};
   batten_solid *function = NULL;
   const double tolerance = 0.1 * s.sections[1].loops.spacing;
-  T_CHECK(section_fit_loops(ctx, &s.sections[0].loops, tolerance, 0.75, &function, &figures) >= 0, "%s",
+  T_CHECK(section_fit_proven(ctx, &s.sections[0].loops, tolerance, 0.75, &function, &figures) >= 0, "%s",
           batten_error(ctx));
-  T_OK(section_certify(ctx, &s.sections[0].loops, function, tolerance, &figures), ctx);
+  T_OK(section_certify(ctx, &s.sections[0].loops, function, tolerance, &figures, NULL), ctx);
   T_CHECK(figures.certified, "a disc with a hole near its edge: wrong sign %.3g", figures.wrong_sign_max);
-  T_OK(section_certify(ctx, &s.sections[1].loops, function, tolerance, &figures), ctx);
+  T_OK(section_certify(ctx, &s.sections[1].loops, function, tolerance, &figures, NULL), ctx);
   T_CHECK(!figures.certified && figures.wrong_sign_max > 0.1 && figures.wrong_sign_max <= 0.2,
           "the same is no disc: wrong sign %.3g, a grid has cells of %.3g", figures.wrong_sign_max, 20.0 / 64);
   batten_solid_free(function);
@@ -270,7 +270,7 @@ static void test_miss(batten_context *ctx) {
   stack_scene_rectangle(&scene, 10, 10, 1);
   fitted f = fit_first(ctx, &scene, 0.0005); /* 0.01 */
   section_figures figures = {0};
-  T_OK(section_certify(ctx, &f.s.sections[0].loops, f.s.sections[0].function, f.tolerance, &figures), ctx);
+  T_OK(section_certify(ctx, &f.s.sections[0].loops, f.s.sections[0].function, f.tolerance, &figures, NULL), ctx);
   T_CHECK(figures.certified, "a square of four points: wrong sign %.3g, tolerance %.3g", figures.wrong_sign_max,
           f.tolerance);
   stack_scene larger = {0};
@@ -279,9 +279,9 @@ static void test_miss(batten_context *ctx) {
                                                     10,  10,  3, 10,  2,    10,     1,   10,     -10,  10,  -10, 9},
                       1);
   stack s = make_stack(ctx, &larger);
-  T_OK(section_certify(ctx, &s.sections[0].loops, f.s.sections[0].function, 0.012, &figures), ctx);
+  T_OK(section_certify(ctx, &s.sections[0].loops, f.s.sections[0].function, 0.012, &figures, NULL), ctx);
   T_CHECK(!figures.certified, "a bump of 0.03 by 0.1 is missed: wrong sign %.3g", figures.wrong_sign_max);
-  T_OK(section_certify(ctx, &f.s.sections[0].loops, f.s.sections[0].function, 0.012, &figures), ctx);
+  T_OK(section_certify(ctx, &f.s.sections[0].loops, f.s.sections[0].function, 0.012, &figures, NULL), ctx);
   T_CHECK(figures.certified, "the square within 0.012: wrong sign %.3g", figures.wrong_sign_max);
   free_stack(&s);
   free_stack(&f.s);
@@ -394,7 +394,7 @@ static void test_threads(void) {
     stack_section one = s[0].sections[i];
     section_figures own = {0};
     stack lone = {.count = 1, .sections = &one}, of = {.count = 1, .sections = &s[0].sections[i]};
-    section_fit_loops(ctx[0], &one.loops, 0.05, 0.75, &one.function, &own);
+    section_fit_proven(ctx[0], &one.loops, 0.05, 0.75, &one.function, &own);
     direct += count_differing(&lone, &of) == 0 && own.centers == figures[0][i].centers && figures[0][i].certified;
     batten_solid_free(one.function);
   }

@@ -134,7 +134,8 @@ typedef enum batten_stack_note_kind {
   BATTEN_NOTE_NO_OVERLAP,  /* component overlaps none of the section above it */
   BATTEN_NOTE_THIN,        /* overlaps, but so little that the solid between thins to under two thirds */
   BATTEN_NOTE_LINKED,      /* as NO_OVERLAP, and joined to component `other` of the other section */
-  BATTEN_NOTE_UNCERTIFIED, /* the section's function has a wrong sign deeper than the tolerance: `value` */
+  BATTEN_NOTE_UNCERTIFIED, /* the section's function has a wrong sign deeper than the tolerance, or may have one; the
+                              deepest that was found: `value`, less than the tolerance where it only may */
   BATTEN_NOTE_CROSSING     /* planes of `section` and `other` cross within both sections */
 } batten_stack_note_kind;
 
@@ -150,11 +151,11 @@ typedef struct batten_stack_info {
   size_t sections, contours, holes; /* in use */
   size_t points_given, centers;     /* centres of all sections, on the curves and off them */
   size_t contours_dropped;
-  size_t certified; /* sections without a wrong sign deeper than the tolerance at any place looked at: a grid
-                       of 64 cells along the longest side, places beside the contours at most 5 tolerances
-                       apart, circles far outside; acute corners have hidden up to 1.5 tolerances */
+  size_t certified; /* sections proven to have no wrong sign farther than 17/16 tolerances from their contours, out to
+                       100 half diagonals (boxes, bounds of function and distance), and of which none deeper than
+                       one tolerance was found; of points in no order: those whose side is settled */
   double section_residual_max; /* farthest that a section's curve misses its points, |F| / |grad F|; caller's unit */
-  double wrong_sign_max;       /* deepest place with a wrong sign, distance to the polygon; caller's unit */
+  double wrong_sign_max;       /* deepest place found with a wrong sign, distance to the polygon; caller's unit */
   double tolerance, spacing, gap; /* as used; spacing, gap: medians; caller's unit */
   size_t pieces;                  /* of the graph of components that overlap (or are linked) */
   size_t non_overlaps, links;
@@ -173,7 +174,7 @@ typedef struct batten_stack_info {
  * section and contour: fewer than three points, contours that cross themselves or each other, no contour at all,
  * planes that coincide or are out of order, rotations that are none, options), NOMEM, TOO_LARGE, SINGULAR, CANCELLED.
  * *out, *notes untouched then. Time: O(sum of centres^3), a point of evaluation O(centres of the 33 sections around
- * it), of 2 with LINEAR, RATIONAL, of 4 with MONOTONE. Progress phases "sections", "certify". */
+ * it), of 2 with LINEAR, RATIONAL, of 4 with MONOTONE. Progress phase "sections". */
 BATTEN_API batten_status batten_stack_build(batten_context *ctx, size_t count, const batten_section *sections,
                                             const batten_stack_options *opt, batten_solid **out,
                                             batten_stack_info *info, batten_stack_note **notes, size_t *note_count);
