@@ -1,12 +1,14 @@
 /* Does a section's function have the sign of its loops, and how far does it miss them?
  *
  * Even-odd and the exact distance to the polygons are the oracle; nothing of how the function was made is used.
+ * Places are looked at first, for they tell how deep a wrong sign is, and where; if none is too deep, prove.c is
+ * asked.
  *
  *   sign   at a grid of 64 cells along the longest side, moved by a part of a cell that no other grid in this folder
  *          has, at places on both sides of the loops - twice as dense as their vertices and no farther apart than
- * five tolerances, just above one tolerance off, two, four, and so on to a cell -, and on circles from 2 to 100 half
- * diagonals away: where F and the distance oppose, the distance is the depth miss   |F| / |grad F| at the vertices of
- * the loops */
+ *          five tolerances, just above one tolerance off, two, four, and so on to a cell -, and on circles from 2 to
+ *          100 half diagonals away: where F and the distance oppose, the distance is the depth
+ *   miss   |F| / |grad F| at the vertices of the loops */
 #include "base/checked.h"
 #include "section/places.h"
 #include "section/section_inner.h"

@@ -10,6 +10,7 @@
  * places.c       places along the loops and beside them, for the fit and for the proof
  * certify.c      does a section's function have the sign of its polygons, and how far does it miss them
  * prove.c        the sign, proven over boxes
+ * local_field.c  F over a box: far centres expanded about it, near ones bounded (local_field.h)
  * components.c   outer loops with their holes, which overlap from section to section, pieces, notes
  * links.c        components without a partner joined in sheared frames
  * crossings.c    pairs of sections whose planes cross within both
@@ -137,7 +138,8 @@ batten_status section_certify(batten_context *ctx, const polygon_set *loops, con
                               double tolerance, section_figures *figures, section_wrong *wrong);
 /* *proven: F has, farther than 17/16 tolerances from the loops and out to 100 half diagonals along x and y, the sign of
  * the signed distance: every box of a quadtree is settled by bounds of both; and no place was seen to be wrong that is
- * deeper than the tolerance. Places seen to be wrong are added to wrong. False also where 400000 boxes do not do. */
+ * deeper than the tolerance. Places seen to be wrong are added to wrong. False also where two million boxes do not do,
+ * and for functions that are no plain splines with r^2 ln r. */
 batten_status section_prove(batten_context *ctx, const polygon_set *loops, const batten_solid *function,
                             double tolerance, bool *proven, section_wrong *wrong);
 /* All sections without apex; figures [count]. Errors name the section ("sections[3]: ..."). */
