@@ -120,7 +120,7 @@ static double left_out(const local_place *a) {
   const double q2 = RHO * RHO / a->square, q = sqrt(q2);
   double power = q;
   for (unsigned k = 0; k < LOCAL_ORDER; k += 2) power *= q2;
-  return fabs(a->w) * a->square * power * (1 + q) / ((1 - q) * LOCAL_ORDER * (LOCAL_ORDER + 1)) * (1 + 0x1p-40);
+  return fabs(a->w) * a->square * power * (1 + q) / ((1 - q) * LOCAL_ORDER * (LOCAL_ORDER + 1)) * (1 + 0x1p-36);
 }
 
 static void expand(const local_source *s, const local_square *q, const local_place *a, double left, local_field *f) {

@@ -63,7 +63,7 @@ typedef struct proof {
   size_t seen, unproven;
   frame *frames;     /* [LEVELS + 1] */
   uint32_t *lists;   /* [LEVELS + 1][centres + edges] */
-  double *distances; /* [edges] squared */
+  double *distances; /* [edges] from the middle */
   section_wrong *wrong;
 } proof;
 

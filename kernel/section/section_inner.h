@@ -115,8 +115,8 @@ batten_status section_fit_loops(batten_context *ctx, const polygon_set *loops, d
 /* From points in no order, [count][2]: POINTS or CARRIER. */
 batten_status section_fit_points(batten_context *ctx, batten_section_method method, size_t count,
                                  const double *points, batten_solid **out, section_figures *figures);
-/* The same, proven by section_certify, whose figures are filled: as long as it finds places of wrong sign, and not too
- * often, they become centres of another fit. The best of them is left. */
+/* The same, proven by section_certify, whose figures are filled: as long as it finds places of wrong sign, and not
+ * too often, they become centres of another fit. The best of them is left. */
 batten_status section_fit_proven(batten_context *ctx, const polygon_set *loops, double tolerance,
                                  double pair_distance, batten_solid **out, section_figures *figures);
 
@@ -136,10 +136,10 @@ void section_add_wrong(section_wrong *wrong, const double *x, double depth);
  * |F| / |grad F| at the points of the loops. wrong (NULL: not wanted) is filled. */
 batten_status section_certify(batten_context *ctx, const polygon_set *loops, const batten_solid *function,
                               double tolerance, section_figures *figures, section_wrong *wrong);
-/* *proven: F has, farther than 17/16 tolerances from the loops and out to 100 half diagonals along x and y, the sign of
- * the signed distance: every box of a quadtree is settled by bounds of both; and no place was seen to be wrong that is
- * deeper than the tolerance. Places seen to be wrong are added to wrong. False also where two million boxes do not do,
- * and for functions that are no plain splines with r^2 ln r. */
+/* *proven: F has, farther than 17/16 tolerances from the loops and out to 100 half diagonals along x and y, the sign
+ * of the signed distance: every box of a quadtree is settled by bounds of both; and no place was seen to be wrong
+ * that is deeper than the tolerance. Places seen to be wrong are added to wrong. False also where two million boxes
+ * do not do, and for functions that are no plain splines with r^2 ln r. */
 batten_status section_prove(batten_context *ctx, const polygon_set *loops, const batten_solid *function,
                             double tolerance, bool *proven, section_wrong *wrong);
 /* All sections without apex; figures [count]. Errors name the section ("sections[3]: ..."). */
