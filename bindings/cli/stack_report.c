@@ -105,9 +105,12 @@ void stack_summary(const stack_work *w) {
            i->parallel ? "parallel" : "not parallel", i->contours, i->holes);
   if (i->route == BATTEN_ROUTE_SPACE)
     cli_line("route", "planes in no sequence: one spline in space through %zu centres", i->centers);
-  else
+  else if (w->request->options.method == BATTEN_SECTION_PAIRS)
     cli_line("fit", "%zu centres, within %.2g of the points; sign certified on %zu sections to %.2g", i->centers,
              i->section_residual_max, i->certified, i->tolerance);
+  else
+    cli_line("fit", "%zu centres, within %.2g of the points; their side settled on %zu sections", i->centers,
+             i->section_residual_max, i->certified);
   if (i->route == BATTEN_ROUTE_SECTIONS)
     cli_line("pieces", "%zu; %zu contours without a partner, %zu joined", i->pieces, i->non_overlaps, i->links);
   print_notes(w);

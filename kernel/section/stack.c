@@ -284,7 +284,14 @@ static batten_status join_sections(batten_context *ctx, stack_state *t, const ba
   return st;
 }
 
-static batten_status tell(batten_context *ctx, const batten_stack_info *info, batten_status worst) {
+static batten_status tell(batten_context *ctx, const batten_stack_options *o, const batten_stack_info *info,
+                          batten_status worst) {
+  if (info->certified < info->sections && info->route == BATTEN_ROUTE_SECTIONS && o->method != BATTEN_SECTION_PAIRS)
+    return batten_fail(
+        ctx, BATTEN_W_AMBIGUOUS,
+        "sections: the points of %zu of %zu do not settle which side of them is inside; give contours in "
+        "their order, or more points",
+        info->sections - info->certified, info->sections);
   if (info->certified < info->sections && info->route == BATTEN_ROUTE_SECTIONS && info->tolerance > 0)
     return batten_fail(
         ctx, BATTEN_W_AMBIGUOUS,
@@ -334,7 +341,7 @@ batten_status batten_stack_build(batten_context *ctx, size_t count, const batten
   if (st < 0) goto done;
   if (f.route == BATTEN_ROUTE_SECTIONS) t = NULL; /* the solid's */
   f.time_total_s = batten_now() - start;
-  st = tell(ctx, &f, worst);
+  st = tell(ctx, &o, &f, worst);
   *out = solid;
   if (info) *info = f;
   if (notes) {

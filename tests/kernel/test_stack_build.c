@@ -428,6 +428,29 @@ static void test_no_sequence(void) {
   drop(&b, &scene);
 }
 
+/* A keel that is far thinner than its points lie apart. */
+static void test_unsettled(void) {
+  static const double half[] = {0.01, 0.012, 0.015, 0.02, 0.03, 0.05, 0.3, 2, 4, 4.5};
+  enum { HEIGHTS = sizeof half / sizeof *half };
+  stack_scene scene = {0};
+  for (int i = 0; i < 2; i++) {
+    stack_scene_slice(&scene, i);
+    stack_scene_disc(&scene, 0, 0, 1, 2 * HEIGHTS);
+    for (size_t k = 0; k < HEIGHTS; k++)
+      for (size_t side = 0; side < 2; side++) {
+        double *x = scene.at + 2 * (2 * HEIGHTS * (size_t)i + (side ? 2 * HEIGHTS - 1 - k : k));
+        x[0] = side ? -half[k] : half[k];
+        x[1] = 0.5 * (double)k;
+      }
+  }
+  batten_stack_options o = batten_stack_options_default();
+  o.method = BATTEN_SECTION_POINTS;
+  built b = build(&scene, &o);
+  T_STATUS(b.status, BATTEN_W_AMBIGUOUS, ctx,
+           "sections: the points of 2 of 2 do not settle which side of them is inside");
+  drop(&b, &scene);
+}
+
 int main(void) {
   ctx = t_context(NULL, NULL, 1);
   test_branches();
@@ -439,6 +462,7 @@ int main(void) {
   test_velocity();
   test_planes_cross();
   test_no_sequence();
+  test_unsettled();
   T_CHECK(batten_bytes_in_use(ctx) == 0, "nothing is left");
   batten_context_free(ctx);
   return t_done();
