@@ -21,7 +21,8 @@
  * whole has 17 bits, its corner is a multiple of 2^-20 of the next power of two and no farther away than 8 of it, and
  * 31 levels take as many bits. The evaluator takes a place into the unit box with two roundings, by 2^-52 of its
  * coordinates, and distances have some more, all relative to the largest coordinates: `slack` is an ample bound of
- * them, by which boxes are larger and bounds wider. */
+ * them, by which boxes are larger and bounds wider. Squares of lengths lose a multiple of 2^-1074, and their roots
+ * 2^-535: where that is no longer little beside `slack`, nothing is proven. */
 #include "base/checked.h"
 #include "section/local_field.h"
 #include "section/section_inner.h"
@@ -41,6 +42,7 @@ static const double LEAST_SEEN = 0.5; /* ... and once one has not been settled *
  * smallest ones, which are settled within this many tolerances if F is not seen to be wrong beyond one in their
  * middle. No box that meets the tolerance and is as small as LEAST reaches farther. */
 static const double BAND = 1.0625;
+static const double SLACK_LEAST = 0x1p-520;
 static const double LEFT_OUT = 1. / 64; /* of the distance or the tolerance: by all expansions */
 
 typedef struct frame {
@@ -225,7 +227,7 @@ static batten_status walk(proof *p) {
 
 /* ---- the whole ----------------------------------------------------------------------------------- */
 
-/* False when the function lies elsewhere. */
+/* False when the function lies elsewhere, or roundings come near the tolerance. */
 static bool open_square(proof *p) {
   const polygon_set *loops = p->loops;
   const double radius = 0.5 * hypot(loops->upper[0] - loops->lower[0], loops->upper[1] - loops->lower[1]);
@@ -239,7 +241,7 @@ static bool open_square(proof *p) {
     size += fabs(p->origin[k]) + 9 * p->scale * p->side;
   }
   p->slack = 64 * DBL_EPSILON * size;
-  return p->slack < LEAST / 16 * p->tolerance;
+  return p->slack >= SLACK_LEAST && p->slack < LEAST / 16 * p->tolerance;
 }
 
 static void open_frames(proof *p) {

@@ -313,6 +313,54 @@ static void test_scale(batten_context *ctx) {
   T_CHECK(same, "the %zu places that are wrong then are the same", wrong[0].count);
 }
 
+/* The function and its loops in another unit of length; not through a fit, which refuses extreme ones. */
+static bool is_proven_in(batten_context *ctx, const polygon_set *loops, const batten_solid *function, double tolerance,
+                         double unit) {
+  batten_spline_parts parts;
+  batten_spline *spline = NULL;
+  batten_carrier *none = NULL;
+  batten_solid *out = NULL;
+  polygon_set own = {0};
+  polygon_fault fault;
+  section_wrong wrong;
+  const size_t count = loops->starts[loops->count];
+  batten_spline_get_parts(batten_solid_spline(function), &parts);
+  double *centers = malloc((parts.count + count) * 2 * sizeof *centers), *points = centers + 2 * parts.count;
+  for (size_t i = 0; i < 2 * parts.count; i++) centers[i] = unit * parts.centers[i];
+  for (size_t i = 0; i < 2 * count; i++) points[i] = unit * loops->points[i];
+  parts.centers = centers;
+  parts.scale *= unit;
+  for (unsigned k = 0; k < 2; k++) parts.origin[k] *= unit;
+  T_OK(polygon_set_make(ctx, loops->count, loops->starts, points, 0, &own, NULL, &fault), ctx);
+  T_OK(batten_spline_create(ctx, &parts, &spline), ctx);
+  T_OK(batten_carrier_none(ctx, 2, &none), ctx);
+  T_OK(batten_solid_create(ctx, spline, none, 1, own.lower, own.upper, 0, NULL, &out), ctx);
+  const bool proven = is_proven(ctx, &own, out, unit * tolerance, &wrong);
+  batten_solid_free(out);
+  batten_carrier_free(none);
+  batten_spline_free(spline);
+  polygon_set_free(&own);
+  free(centers);
+  return proven;
+}
+
+/* Squares of lengths below 1e-154 are not what they should be, nor distances made of them: no proof there. */
+static void test_tiny(batten_context *ctx) {
+  stack_scene scene = {0};
+  stack_scene_slice(&scene, 0);
+  stack_scene_crescent(&scene, 1, 40);
+  polygon_set loops = loops_of(ctx, &scene, 0);
+  const double tolerance = 0.1 * loops.spacing;
+  batten_solid *function = NULL;
+  section_figures figures;
+  T_CHECK(section_fit_loops(ctx, &loops, tolerance, 0.75, &function, &figures) >= 0, "%s", batten_error(ctx));
+  T_CHECK(is_proven_in(ctx, &loops, function, tolerance, 0x1p-400), "a crescent 1e-120 wide is proven");
+  T_CHECK(!is_proven_in(ctx, &loops, function, tolerance, 0x1p-500), "of one 1e-150 wide distances are too coarse");
+  batten_solid_free(function);
+  polygon_set_free(&loops);
+  stack_scene_free(&scene);
+}
+
 static batten_status call_proven(batten_context *ctx, void *arg) {
   (void)arg;
   stack_scene scene = {0};
@@ -339,6 +387,7 @@ int main(void) {
   test_bumps(ctx);
   test_others(ctx);
   test_scale(ctx);
+  test_tiny(ctx);
   T_CHECK(batten_bytes_in_use(ctx) == 0, "nothing held");
   batten_context_free(ctx);
   t_fail_every_allocation("section_fit_proven", call_proven, NULL);
