@@ -86,9 +86,10 @@ void picture_to_ball(const picture_ball *ball, const double *point, float out[3]
 typedef struct picture_scene {
   size_t vertex_count, triangle_count, dot_count, segment_count;
   const uint32_t *triangles;
-  float *vertices; /* [V][3] */
-  float *normals;  /* [V][3] */
-  float *tones;    /* [V] in [0, 1] or NaN; NULL without colours. With stripes their values */
+  float *vertices;     /* [V][3] */
+  float *normals;      /* [V][3] of vertices, and others after these for corners at creases */
+  uint32_t *normal_of; /* [3 F] of each corner, an index of normals; NULL: its vertex's */
+  float *tones;        /* [V] in [0, 1] or NaN; NULL without colours. With stripes their values */
   batten_picture_map map;
   float period;    /* of the values of stripes, 0 = none */
   float *dots;     /* [dot_count][3] */
@@ -99,6 +100,11 @@ typedef struct picture_scene {
   bool both_sides;                    /* look alike */
   double progress_at, progress_share; /* of the whole picture, before it and its own */
 } picture_scene;
+/* 40 degrees: triangles that lean farther from each other are parted by an edge. */
+static const float picture_crease_cosine = 0.766f;
+void picture_face_normal(const picture_scene *s, const uint32_t v[3], float out[3]);
+/* Gives the corners of triangles at creases normals of their own. Fails: NOMEM, the scene stays as it was. */
+batten_status picture_part_normals(batten_context *ctx, picture_scene *s);
 /* Tells of progress with the scene, part in [0, 1]. */
 batten_status picture_progress(batten_context *ctx, const picture_scene *scene, double part);
 

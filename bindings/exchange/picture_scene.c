@@ -99,6 +99,7 @@ static batten_status color_range(batten_context *ctx, size_t count, batten_pictu
 static void scene_free(batten_context *ctx, picture_scene *s) {
   batten_free(ctx, s->vertices);
   batten_free(ctx, s->normals);
+  batten_free(ctx, s->normal_of);
   batten_free(ctx, s->tones);
   batten_free(ctx, s->dots);
   batten_free(ctx, s->segments);
@@ -167,7 +168,7 @@ static batten_status scene_make(batten_context *ctx, picture_view *view) {
   if (st < 0) goto done;
   s->period = (float)(o->color_upper - o->color_lower);
   fill_scene(&view->ball, mesh, o, normals, s);
-  st = BATTEN_OK;
+  st = o->normals ? BATTEN_OK : picture_part_normals(ctx, s);
 done:
   batten_free(ctx, normals);
   return st;

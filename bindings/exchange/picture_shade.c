@@ -134,7 +134,7 @@ static void ray(const picture_camera *c, double x, double y, float eye[3], float
   }
 }
 
-static void face_normal(const picture_scene *s, const uint32_t v[3], float out[3]) {
+void picture_face_normal(const picture_scene *s, const uint32_t v[3], float out[3]) {
   const float *a = s->vertices + 3 * (size_t)v[0], *b = s->vertices + 3 * (size_t)v[1];
   const float *c = s->vertices + 3 * (size_t)v[2];
   float p[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]}, q[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
@@ -143,9 +143,6 @@ static void face_normal(const picture_scene *s, const uint32_t v[3], float out[3
   out[2] = p[0] * q[1] - p[1] * q[0];
   normalize(out);
 }
-
-/* 40 degrees: a triangle that leans so far from the mean of its corner's triangles is parted from them by an edge. */
-static const float crease_cosine = 0.766f;
 
 /* Shares of a triangle's corners in the place that is seen at a sample; in space, that is weighed by nearness. */
 static void corner_shares(const float *const p[3], float sx, float sy, float share[3]) {
@@ -191,11 +188,12 @@ static void surface_point(const shading *s, size_t x, size_t y, point *out) {
     const float *p[3] = {b->screen + 3 * (size_t)v[0], b->screen + 3 * (size_t)v[1], b->screen + 3 * (size_t)v[2]};
     float share[3], flat[3], sx = (float)x + 0.5f, sy = (float)y + 0.5f;
     corner_shares(p, sx, sy, share);
-    face_normal(scene, v, flat);
+    picture_face_normal(scene, v, flat);
     if (scene->tones) out->tone = 0;
     for (size_t k = 0; k < 3; k++) {
-      const float *smooth = scene->normals + 3 * (size_t)v[k];
-      const float *normal = dotf(smooth, flat) < crease_cosine ? flat : smooth;
+      uint32_t own = scene->normal_of ? scene->normal_of[3 * item + k] : v[k];
+      const float *smooth = scene->normals + 3 * (size_t)own;
+      const float *normal = dotf(smooth, flat) < picture_crease_cosine ? flat : smooth;
       if (scene->tones) out->tone += share[k] * scene->tones[v[k]];
       for (size_t j = 0; j < 3; j++) out->normal[j] += share[k] * normal[j];
     }
@@ -228,8 +226,8 @@ static size_t pixel_points(const shading *s, size_t px, size_t py, point *out) {
       uint32_t item = b->item[at];
       dots |= item >= s->scene->triangle_count;
       if (dots || item == first) continue;
-      face_normal(s->scene, s->scene->triangles + 3 * (size_t)item, first == UINT32_MAX ? first_face : face);
-      crease |= first != UINT32_MAX && dotf(first_face, face) < crease_cosine;
+      picture_face_normal(s->scene, s->scene->triangles + 3 * (size_t)item, first == UINT32_MAX ? first_face : face);
+      crease |= first != UINT32_MAX && dotf(first_face, face) < picture_crease_cosine;
       if (first == UINT32_MAX) first = item;
     }
   /* 0.4 %: a surface so steep that it recedes by that in one pixel is an edge to the eye. */

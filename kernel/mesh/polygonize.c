@@ -209,15 +209,15 @@ typedef struct avoided {
 } avoided;
 
 /* Adds corners of triangles that cross others; *fresh: how many of them no crease was kept away from before. */
-static batten_status add_crossings(const mesh_surface *s, double edge, avoided *a, size_t *fresh) {
+static batten_status add_crossings(const mesh_surface *s, double edge, avoided *a, size_t *fresh, size_t *pairs) {
   batten_context *ctx = s->ctx;
-  size_t marked = 0, before = a->count, pairs = 0;
+  size_t marked = 0, before = a->count;
+  *fresh = *pairs = 0;
   unsigned char *marks = batten_alloc_array(ctx, s->triangle_count, 1);
   batten_status st =
-      marks ? batten_mesh_find_crossings(ctx, s->vertex_count, s->points, s->triangle_count, s->origin, marks, &pairs)
+      marks ? batten_mesh_find_crossings(ctx, s->vertex_count, s->points, s->triangle_count, s->origin, marks, pairs)
             : BATTEN_E_NOMEM;
-  *fresh = 0;
-  for (size_t t = 0; st >= 0 && pairs && t < s->triangle_count; t++) marked += marks[t];
+  for (size_t t = 0; st >= 0 && *pairs && t < s->triangle_count; t++) marked += marks[t];
   double *grown = marked ? batten_realloc_array(ctx, a->places, before + marked, 3 * sizeof *grown) : NULL;
   if (marked && !grown) st = BATTEN_E_NOMEM;
   if (grown) a->places = grown;
@@ -233,16 +233,16 @@ static batten_status add_crossings(const mesh_surface *s, double edge, avoided *
 
 /* Makes the settled surface follow its creases. Where that makes it cross itself it is tried again without these
  * places; in the end, or where it misses the accuracy that it had, it stays as it was. Parts that are too thin for
- * the mesh may cross without any crease near them. */
+ * the mesh may cross anew without any crease near them, if they crossed before, but not twice as often. */
 static batten_status sharpen(batten_sampler *sampler, const batten_frame *frame, double edge,
                              const batten_polygonize_options *opt, mesh_surface *surface,
                              batten_polygonize_info *info) {
-  enum { TRIES = 4 };
+  enum { TRIES = 4, AVOID_MAX = 4096 };
   double distance = 0, tolerance = opt->accuracy * frame->diagonal;
   avoided avoid = {0};
-  size_t fresh = 1;
+  size_t fresh = 1, pairs = 0;
   batten_status st = BATTEN_OK;
-  for (int attempt = 0; st >= 0 && fresh && attempt < TRIES; attempt++) {
+  for (int attempt = 0; st >= 0 && fresh && avoid.count < AVOID_MAX && attempt < TRIES; attempt++) {
     size_t count = 0;
     mesh_surface sharp = {.ctx = sampler->ctx};
     fresh = 0;
@@ -251,8 +251,9 @@ static batten_status sharpen(batten_sampler *sampler, const batten_frame *frame,
       st = mesh_surface_sharpen(&sharp, sampler, frame->lower, frame->upper, edge, opt->sharp_deg * DEGREE,
                                 avoid.count, avoid.places, &count);
     if (st >= 0 && count) st = mesh_surface_settle(&sharp, sampler, edge, tolerance, &distance);
-    if (st >= 0 && count) st = add_crossings(&sharp, edge, &avoid, &fresh);
-    if (st >= 0 && !fresh && count && distance <= fmax(tolerance, info->distance_max)) {
+    if (st >= 0 && count) st = add_crossings(&sharp, edge, &avoid, &fresh, &pairs);
+    if (st >= 0 && !fresh && pairs <= 2 * info->self_intersections && count &&
+        distance <= fmax(tolerance, info->distance_max)) {
       mesh_surface was = *surface;
       *surface = sharp;
       sharp = was;

@@ -278,6 +278,44 @@ static void test_odd(batten_context *ctx) {
   batten_mesh_free(mesh);
 }
 
+/* A roof of two triangles: steep, its corners at the ridge have the normals of either side; flat, one for both. */
+static batten_status part_roof(batten_context *ctx, void *height) {
+  const uint32_t triangles[] = {0, 1, 2, 1, 0, 3};
+  const float h = *(float *)height, v[] = {0, 0, h, 1, 0, h, 0.5f, 1, 0, 0.5f, -1, 0};
+  picture_scene s = {.vertex_count = 4, .triangle_count = 2, .triangles = triangles};
+  s.vertices = batten_alloc_array(ctx, 12, sizeof *s.vertices);
+  s.normals = batten_alloc_array(ctx, 12, sizeof *s.normals);
+  batten_status st = s.vertices && s.normals ? BATTEN_OK : BATTEN_E_NOMEM;
+  if (st >= 0) {
+    memcpy(s.vertices, v, sizeof v);
+    for (size_t i = 0; i < 12; i++) s.normals[i] = i % 3 == 2;
+    st = picture_part_normals(ctx, &s);
+  }
+  if (st >= 0 && h < 0.3f) T_CHECK(!s.normal_of, "a flat roof keeps the normals of its vertices");
+  if (st >= 0 && h > 0.3f) {
+    float side[2][3], worst = 0;
+    for (size_t t = 0; t < 2; t++) {
+      picture_face_normal(&s, triangles + 3 * t, side[t]);
+      for (size_t k = 0; k < 6; k++)
+        worst = fmaxf(worst, fabsf(s.normals[3 * (size_t)s.normal_of[3 * t + k / 3] + k % 3] - side[t][k % 3]));
+    }
+    T_RATIO((double)worst, 1e-6, "both corners of a ridge have the normal of their side");
+    T_CHECK(s.normal_of[2] == 2 && s.normal_of[5] == 3 && side[0][1] > 0.6f && side[1][1] < -0.6f,
+            "others their own");
+  }
+  batten_free(ctx, s.vertices);
+  batten_free(ctx, s.normals);
+  batten_free(ctx, s.normal_of);
+  return st;
+}
+
+static void test_creases(batten_context *ctx) {
+  float heights[] = {0.1f, 1};
+  T_OK(part_roof(ctx, &heights[0]), ctx);
+  T_OK(part_roof(ctx, &heights[1]), ctx);
+  t_fail_every_allocation("normals at creases", part_roof, &heights[1]);
+}
+
 /* ---- plane: a ring, whose area in pixels follows from its box --------------------------------------- */
 
 static batten_status ring(const void *user, batten_context *ctx, size_t count, const double *p, double *values,
@@ -356,6 +394,7 @@ int main(void) {
   test_ball(ctx, ball);
   test_surface(ctx, ball);
   test_odd(ctx);
+  test_creases(ctx);
   test_bad(ctx, ball);
   test_ring(ctx);
   batten_mesh_free(ball);

@@ -316,6 +316,31 @@ static void test_rounded(void) {
   }
 }
 
+static double shape_noisy(const double *x, double *g) {
+  double f = shape_cube(x, g), s[3], c[3];
+  for (int k = 0; k < 3; k++) {
+    s[k] = sin(40 * x[k]);
+    c[k] = cos(40 * x[k]);
+  }
+  for (int k = 0; k < 3; k++) g[k] += 0.03 * 40 * c[k] * s[(k + 1) % 3] * s[(k + 2) % 3];
+  return f + 0.03 * s[0] * s[1] * s[2];
+}
+
+/* Creases all over: followed or not, the surface crosses itself no more than without. */
+static void test_noisy(void) {
+  shape s = shape_make(shape_noisy);
+  size_t n = shape_seeds(&s, 0.95, 300, 7, seeds);
+  batten_polygonize_options o = shape_options(&s, 1.4, 0.04);
+  polygonized plain = polygonize(ctx, &s, &o, n, seeds);
+  o.sharp_deg = 35;
+  polygonized p = polygonize(ctx, &s, &o, n, seeds);
+  T_CHECK(p.m.manifold && p.crossings <= 2 * plain.crossings,
+          "noisy: %zu pairs cross, %zu without creases (%zu on them)", p.crossings, plain.crossings,
+          p.info.crease_vertices);
+  batten_mesh_free(plain.mesh);
+  batten_mesh_free(p.mesh);
+}
+
 /* The cylinder cut by a box through its axis: the circles end on the box. */
 static void test_clipped(void) {
   shape s = shape_make(shape_cylinder);
@@ -377,6 +402,7 @@ int main(void) {
   test_shapes();
   test_smooth();
   test_rounded();
+  test_noisy();
   test_clipped();
   test_invariance();
   T_CHECK(batten_bytes_in_use(ctx) == 0, "all released");
