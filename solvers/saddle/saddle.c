@@ -11,18 +11,28 @@
 /* A step that gains less than this factor has stalled. */
 static const double STALL = 0.25;
 
+/* Of the iterative method: below 1e-13 rounding of the rows that are checked is what one would see. */
+static const double ACCURACY_MIN = 1e-13, ACCURACY_MAX = 0.1, OVERLAP_MAX = 4;
+
+/* Distances are compared by their squares. */
+static const double COORDINATE_MAX = 1e150;
+
 const char *batten_saddle_method_name(batten_saddle_method method) {
   static const char *const names[] = {[BATTEN_SADDLE_AUTO] = "auto",
                                       [BATTEN_SADDLE_CHOLESKY] = "cholesky",
                                       [BATTEN_SADDLE_CHOLESKY_MIXED] = "cholesky-mixed",
                                       [BATTEN_SADDLE_LDL] = "ldl",
-                                      [BATTEN_SADDLE_QR] = "qr"};
+                                      [BATTEN_SADDLE_QR] = "qr",
+                                      [BATTEN_SADDLE_ITERATIVE] = "iterative"};
   return (size_t)method < sizeof names / sizeof *names ? names[method] : "unknown method";
 }
 
 batten_saddle_options batten_saddle_options_default(void) {
-  return (batten_saddle_options){
-      .struct_size = sizeof(batten_saddle_options), .refine_max = 10, .residual_tol = 1e-13};
+  return (batten_saddle_options){.struct_size = sizeof(batten_saddle_options),
+                                 .refine_max = 10,
+                                 .residual_tol = 1e-13,
+                                 .accuracy = 1e-6,
+                                 .iterations_max = 200};
 }
 
 /* ---- Memory and choice of method ---- */
@@ -95,6 +105,8 @@ static batten_status factor_with(batten_saddle *s, batten_saddle_method method) 
   bool mixed = method == BATTEN_SADDLE_CHOLESKY_MIXED;
   free_factor(s);
   s->info.method = method;
+  if (method == BATTEN_SADDLE_ITERATIVE)
+    return batten_fail(s->ctx, BATTEN_E_INVALID, "opt.method: iterative is not built in; choose another method");
   if (method == BATTEN_SADDLE_LDL || method == BATTEN_SADDLE_QR) {
     batten_saddle_qr_free(s);
     return batten_saddle_dense_factor(s, method);
@@ -148,10 +160,45 @@ static batten_status check_matrix(batten_context *ctx, const batten_saddle_matri
 static batten_status check_options(batten_context *ctx, const batten_saddle_options *o) {
   batten_status st = batten_check_struct(ctx, "batten_saddle_options", o->struct_size, sizeof *o);
   if (st < 0) return st;
-  if ((int)o->method < BATTEN_SADDLE_AUTO || (int)o->method > BATTEN_SADDLE_QR)
+  if ((int)o->method < BATTEN_SADDLE_AUTO || (int)o->method > BATTEN_SADDLE_ITERATIVE)
     return batten_fail(ctx, BATTEN_E_INVALID, "opt.method: %d; use one of batten_saddle_method", (int)o->method);
   if (!(o->residual_tol > 0 && o->residual_tol <= DBL_MAX))
     return batten_fail(ctx, BATTEN_E_INVALID, "opt.residual_tol: %g; must be positive", o->residual_tol);
+  if (!(o->accuracy >= ACCURACY_MIN && o->accuracy <= ACCURACY_MAX))
+    return batten_fail(ctx, BATTEN_E_INVALID, "opt.accuracy: %g; give %g .. %g", o->accuracy, ACCURACY_MIN,
+                       ACCURACY_MAX);
+  if (!(o->products_accuracy == 0 || (o->products_accuracy > 0 && o->products_accuracy <= ACCURACY_MAX)))
+    return batten_fail(ctx, BATTEN_E_INVALID, "opt.products_accuracy: %g; give up to %g, or 0 to have it chosen",
+                       o->products_accuracy, ACCURACY_MAX);
+  if (!(o->overlap >= 0 && o->overlap <= OVERLAP_MAX))
+    return batten_fail(ctx, BATTEN_E_INVALID, "opt.overlap: %g; give 0 .. %g", o->overlap, OVERLAP_MAX);
+  if ((int)o->krylov < BATTEN_SADDLE_KRYLOV_AUTO || (int)o->krylov > BATTEN_SADDLE_CG)
+    return batten_fail(ctx, BATTEN_E_INVALID, "opt.krylov: %d; use one of batten_saddle_krylov", (int)o->krylov);
+  if (o->iterations_max == 0) return batten_fail(ctx, BATTEN_E_INVALID, "opt.iterations_max: 0; must be positive");
+  return BATTEN_OK;
+}
+
+/* What only the iterative method asks for. */
+static batten_status check_sums(batten_context *ctx, const batten_saddle_matrix *m) {
+  const batten_saddle_sums *s = m->sums;
+  if (!s)
+    return batten_fail(
+        ctx, BATTEN_E_INVALID,
+        "matrix.sums: NULL, but opt.method is iterative, which needs products and points; give them, or "
+        "choose another method");
+  if (s->dimension < 1 || s->dimension > 3)
+    return batten_fail(ctx, BATTEN_E_INVALID, "matrix.sums.dimension: %u; give 1 .. 3", s->dimension);
+  if (!s->plan || !s->apply || !s->release)
+    return batten_fail(ctx, BATTEN_E_INVALID, "matrix.sums.%s: NULL; give a callback",
+                       !s->plan    ? "plan"
+                       : !s->apply ? "apply"
+                                   : "release");
+  if (m->n > 0 && !s->points) return batten_fail(ctx, BATTEN_E_INVALID, "matrix.sums.points: NULL");
+  size_t count = m->n * s->dimension;
+  for (size_t i = 0; i < count; i++)
+    if (!(fabs(s->points[i]) <= COORDINATE_MAX))
+      return batten_fail(ctx, BATTEN_E_INVALID, "matrix.sums.points[%zu]: coordinate %zu is %g; must be within %g",
+                         i / s->dimension, i % s->dimension, s->points[i], COORDINATE_MAX);
   return BATTEN_OK;
 }
 
@@ -182,6 +229,10 @@ batten_status batten_saddle_factor(batten_context *ctx, const batten_saddle_matr
   if (st < 0) return st;
   st = check_matrix(ctx, matrix);
   if (st < 0) return st;
+  if (options.method == BATTEN_SADDLE_ITERATIVE) {
+    st = check_sums(ctx, matrix);
+    if (st < 0) return st;
+  }
 
   batten_saddle *s = batten_alloc(ctx, sizeof *s);
   if (!s) return BATTEN_E_NOMEM;
@@ -212,11 +263,31 @@ void batten_saddle_free(batten_saddle *s) {
   if (!s) return;
   free_factor(s);
   batten_saddle_qr_free(s);
+  batten_free(s->ctx, s->begin);
   batten_free(s->ctx, s->p_scale);
   batten_free(s->ctx, s);
 }
 
 batten_saddle_info batten_saddle_get_info(const batten_saddle *s) { return s->info; }
+
+batten_status batten_saddle_begin_at(batten_context *ctx, batten_saddle *s, const double *w) {
+  batten_status st = check_handle(ctx, s);
+  if (st < 0) return st;
+  size_t n = s->matrix.n;
+  size_t bad = w ? batten_first_nonfinite(n, w) : n;
+  if (bad < n) return batten_fail(ctx, BATTEN_E_INVALID, "w[%zu]: %g is not finite", bad, w[bad]);
+  if (s->info.method != BATTEN_SADDLE_ITERATIVE) return BATTEN_OK;
+  if (w && !s->begin) {
+    s->begin = batten_alloc_array(ctx, n, sizeof *s->begin);
+    if (!s->begin) return BATTEN_E_NOMEM;
+  }
+  if (w && n > 0) memcpy(s->begin, w, n * sizeof *w);
+  if (!w) {
+    batten_free(ctx, s->begin);
+    s->begin = NULL;
+  }
+  return BATTEN_OK;
+}
 
 /* ---- Solve ---- */
 
@@ -370,6 +441,9 @@ batten_status batten_saddle_inverse_diagonal(batten_context *ctx, batten_saddle 
   for (size_t q = 0; q < count; q++)
     if (index[q] >= n)
       return batten_fail(ctx, BATTEN_E_INVALID, "index[%zu]: %zu; must be below %zu", q, index[q], n);
+
+  if (s->info.method == BATTEN_SADDLE_ITERATIVE)
+    return batten_fail(ctx, BATTEN_E_INVALID, "s: method iterative has no factor; choose another method");
 
   double *result = batten_alloc_array(ctx, count, sizeof *result);
   if (!result) return BATTEN_E_NOMEM;

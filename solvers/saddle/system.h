@@ -47,6 +47,8 @@ struct batten_saddle {
   double *a;             /* [N+k][N+k] */
   batten_la_int *pivots; /* [N+k], LDL' */
   double *tau;           /* [N+k], QR */
+
+  double *begin; /* [N] where the next solve by iteration begins, NULL: at zero */
 };
 
 /* A double factor with a smaller reciprocal condition counts as singular. 32: a pivot that should be 0 (duplicates)

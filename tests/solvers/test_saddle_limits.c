@@ -26,8 +26,8 @@ static batten_status run(batten_context *ctx, const scene *s, batten_saddle_meth
 }
 
 static void test_names(void) {
-  static const char *const names[] = {"auto", "cholesky", "cholesky-mixed", "ldl", "qr"};
-  for (int q = 0; q < 5; q++)
+  static const char *const names[] = {"auto", "cholesky", "cholesky-mixed", "ldl", "qr", "iterative"};
+  for (int q = 0; q < 6; q++)
     T_CHECK(!strcmp(batten_saddle_method_name((batten_saddle_method)q), names[q]), "name %s", names[q]);
   T_CHECK(!strcmp(batten_saddle_method_name((batten_saddle_method)9), "unknown method"),
           "name of a method that is none");
@@ -50,6 +50,7 @@ static void test_arguments(batten_context *ctx) {
   T_STATUS(batten_saddle_factor(ctx, &m, &o, &h), BATTEN_E_INVALID, ctx, "opt.residual_tol: 0");
   o.residual_tol = NAN;
   T_STATUS(batten_saddle_factor(ctx, &m, &o, &h), BATTEN_E_INVALID, ctx, "opt.residual_tol: nan");
+  T_STATUS(factor(ctx, &m, BATTEN_SADDLE_ITERATIVE), BATTEN_E_INVALID, ctx, "matrix.sums: NULL, but opt.method");
   m.p = NULL;
   T_STATUS(factor(ctx, &m, BATTEN_SADDLE_AUTO), BATTEN_E_INVALID, ctx, "matrix.p: NULL with k = 4");
   m = good;
