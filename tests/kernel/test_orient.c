@@ -171,7 +171,7 @@ static void test_system(batten_context *ctx, unsigned n) {
       rhs[N + i * n + q] = g[i * n + q];
     }
   }
-  batten_saddle_matrix matrix = {size, n + 1, p, hermite_fill, &h};
+  batten_saddle_matrix matrix = {size, n + 1, p, hermite_fill, &h, NULL};
   batten_saddle_options options = batten_saddle_options_default();
   options.method = BATTEN_SADDLE_LDL;
   batten_saddle *saddle = NULL;
