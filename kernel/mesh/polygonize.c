@@ -1,7 +1,7 @@
 /* The surface f = 0 as a triangle mesh: track (track.c), improve and settle (improve.c). See <batten/mesh.h>. */
 #include "polygonize.h"
 
-#include "basis/neighbours.h"
+#include "base/neighbours.h"
 #include "improve.h"
 #include "mesh_inner.h"
 #include "seeds.h"

@@ -9,7 +9,7 @@
 #include <string.h>
 
 #include "base/checked.h"
-#include "basis/neighbours.h"
+#include "base/neighbours.h"
 #include "basis/quantile.h"
 #include "mesh/vec.h"
 #include "section/path.h"

@@ -7,7 +7,7 @@
  *   - a centre off the loops falls to another plane near it where that plane's loops say the other sign.
  * Shells of points far around hold f down there, as in fits of oriented points in space. */
 #include "base/checked.h"
-#include "basis/neighbours.h"
+#include "base/neighbours.h"
 #include "section/section_inner.h"
 
 #include <string.h>

@@ -10,8 +10,8 @@
 #include <string.h>
 
 #include "base/checked.h"
+#include "base/neighbours.h"
 #include "basis/eigen3.h"
-#include "basis/neighbours.h"
 
 /* Neighbours: enough to span a plane where points crowd along scan lines, few enough to stay local. */
 enum { NEIGHBOURS_2D = 4, NEIGHBOURS_3D = 10, CHUNK = 256, WIDE = 64 };

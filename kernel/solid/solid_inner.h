@@ -2,7 +2,7 @@
 #ifndef BATTEN_SOLID_INNER_H
 #define BATTEN_SOLID_INNER_H
 
-#include "basis/neighbours.h"
+#include "base/neighbours.h"
 #include "solid/solid_form.h"
 
 #include <stdatomic.h>

@@ -2,7 +2,7 @@
 #include "spline/clusters.h"
 
 #include "base/checked.h"
-#include "basis/neighbours.h"
+#include "base/neighbours.h"
 
 /* Nodes of a tree in which every cluster of more than CLUSTER_LEAF is halved, as places of a heap: a level is whole
  * or not there, since clusters of a level differ by one term at most. */

@@ -1,5 +1,5 @@
 /* Nearest points: against all pairs, with ties, duplicates and lines. */
-#include "basis/neighbours.h"
+#include "base/neighbours.h"
 #include "tap.h"
 
 enum { MAX = 700, K = 7 };

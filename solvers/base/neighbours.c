@@ -5,7 +5,7 @@
  *
  * Ranges halve, so the depth is at most 64 and a walk needs no recursion. Points with equal coordinates are ordered
  * by their index, so that the permutation depends on nothing but the input. */
-#include "basis/neighbours.h"
+#include "base/neighbours.h"
 
 #include <math.h>
 #include <string.h>

@@ -3,8 +3,8 @@
  * Answers are the same for any thread count and any order of the work: ties in distance go to the lower index.
  * Distances are compared by their squares: coordinates between 1e-150 and 1e150.
  * Time: O(N log N) to build, O(k log N) a query for points that lie on curves and surfaces. */
-#ifndef BATTEN_BASIS_NEIGHBOURS_H
-#define BATTEN_BASIS_NEIGHBOURS_H
+#ifndef BATTEN_BASE_NEIGHBOURS_H
+#define BATTEN_BASE_NEIGHBOURS_H
 
 #include <batten/base.h>
 
