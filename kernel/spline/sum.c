@@ -36,7 +36,7 @@ BATTEN_ALWAYS_INLINE void add_centre(unsigned n, unsigned power, unsigned order,
     double d2 = dx * dx, t = gx * dx;
     if (n > 1) d2 += dy * dy, t += gy * dy;
     if (n > 2) d2 += dz * dz, t += gz * dz;
-    const batten_radial f = batten_green_radial(power, order + hermite, d2);
+    const batten_radial_terms f = batten_green_radial(power, order + hermite, d2);
     sums[0][i] += hermite ? w * f.f0 - t * f.f1 : w * f.f0;
     if (order == 0) continue;
     /* u1 d_a and u2 d_a d_b collect what has the same shape. */
@@ -120,7 +120,7 @@ BATTEN_ALWAYS_INLINE void fill(unsigned n, unsigned power, unsigned kind, const 
       double d2 = dx * dx;
       if (n > 1) d2 += dy * dy;
       if (n > 2) d2 += dz * dz;
-      const batten_radial f = batten_green_radial(power, kind, d2);
+      const batten_radial_terms f = batten_green_radial(power, kind, d2);
       if (kind == 0) column[i] = factor * f.f0;
       if (kind == 1) column[i] = factor * (f.f1 * (ra[i] - ca));
       if (kind == 2) column[i] = factor * (f.f1 * delta + f.f2 * ((ra[i] - ca) * (rb[i] - cb)));

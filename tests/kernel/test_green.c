@@ -44,7 +44,7 @@ static void test_radial(void) {
     double worst = 0, cancelled = 0;
     for (double r = 1e-12; r < 3; r *= 1.0009) {
       double d2 = r * r;
-      batten_radial f = batten_green_radial(power, 3, d2);
+      batten_radial_terms f = batten_green_radial(power, 3, d2);
       double got[4] = {f.f0, f.f1, f.f2, f.f3};
       long double want[4], root = sqrtl((long double)d2);
       reference(power, root, want);
@@ -58,7 +58,7 @@ static void test_radial(void) {
     }
     T_RATIO(worst, 4 * DBL_EPSILON, "power %u: phi, relative error", power);
     T_RATIO(cancelled, 50 * DBL_EPSILON, "power %u: phi to phi3", power);
-    batten_radial zero = batten_green_radial(power, 3, 0), tiny = batten_green_radial(power, 3, 1e-200);
+    batten_radial_terms zero = batten_green_radial(power, 3, 0), tiny = batten_green_radial(power, 3, 1e-200);
     T_CHECK(zero.f0 == 0 && zero.f1 == 0 && zero.f2 == 0 && zero.f3 == 0, "power %u: all 0 at the centre", power);
     T_CHECK(isfinite(tiny.f0) && isfinite(tiny.f1) && isfinite(tiny.f2) && isfinite(tiny.f3),
             "power %u: finite at 1e-100 from the centre", power);

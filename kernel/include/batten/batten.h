@@ -9,6 +9,7 @@
 #include <batten/convex.h>
 #include <batten/curve.h>
 #include <batten/field.h>
+#include <batten/fmm.h>
 #include <batten/frep.h>
 #include <batten/loft.h>
 #include <batten/lsq.h>
