@@ -47,6 +47,10 @@ static size_t handle_bytes(size_t k) { return sizeof(batten_saddle) + k * sizeof
 size_t batten_saddle_bytes(batten_saddle_method method, size_t n, size_t k) {
   size_t order, bytes;
   if (k > n || !batten_add(n, k, &order) || !batten_la_fits(order)) return SIZE_MAX;
+  if (method == BATTEN_SADDLE_ITERATIVE) {
+    bytes = batten_saddle_iterative_bytes(NULL, n, k);
+    return batten_add(bytes, handle_bytes(k), &bytes) ? bytes : SIZE_MAX;
+  }
   bool dense = method == BATTEN_SADDLE_LDL || method == BATTEN_SADDLE_QR;
   if (dense)
     bytes = batten_saddle_dense_bytes(method, n, k);
@@ -66,8 +70,16 @@ static size_t allowed_bytes(const batten_saddle *s) {
   return allowed;
 }
 
+static size_t wanted_bytes(const batten_saddle *s, batten_saddle_method method) {
+  size_t bytes;
+  if (method != BATTEN_SADDLE_ITERATIVE) return batten_saddle_bytes(method, s->matrix.n, s->matrix.k);
+  return batten_add(batten_saddle_iterative_bytes(s, s->matrix.n, s->matrix.k), handle_bytes(s->matrix.k), &bytes)
+             ? bytes
+             : SIZE_MAX;
+}
+
 static bool fits(const batten_saddle *s, batten_saddle_method method) {
-  return batten_saddle_bytes(method, s->matrix.n, s->matrix.k) <= allowed_bytes(s);
+  return wanted_bytes(s, method) <= allowed_bytes(s);
 }
 
 static batten_saddle_method first_method(const batten_saddle *s) {
@@ -82,9 +94,11 @@ static batten_status too_large(const batten_saddle *s, batten_saddle_method meth
       s->ctx, BATTEN_E_TOO_LARGE,
       "matrix.n: %zu rows by %s take %zu bytes, the context allows %zu%s%s; raise memory_limit or use fewer "
       "points%s",
-      s->matrix.n, batten_saddle_method_name(method), batten_saddle_bytes(method, s->matrix.n, s->matrix.k),
-      allowed_bytes(s), *reason ? ", since " : "", reason,
-      method == BATTEN_SADDLE_CHOLESKY_MIXED || *reason ? "" : ", or method cholesky-mixed");
+      s->matrix.n, batten_saddle_method_name(method), wanted_bytes(s, method), allowed_bytes(s),
+      *reason ? ", since " : "", reason,
+      method == BATTEN_SADDLE_CHOLESKY_MIXED || method == BATTEN_SADDLE_ITERATIVE || *reason
+          ? ""
+          : ", or method cholesky-mixed");
 }
 
 /* The method to try after `method`; AUTO when there is none. */
@@ -98,6 +112,7 @@ static batten_saddle_method next_method(batten_saddle_method method) {
 static void free_factor(batten_saddle *s) {
   batten_saddle_project_free(s);
   batten_saddle_dense_free(s);
+  batten_saddle_iterative_free(s);
   s->factored = false;
 }
 
@@ -105,8 +120,10 @@ static batten_status factor_with(batten_saddle *s, batten_saddle_method method) 
   bool mixed = method == BATTEN_SADDLE_CHOLESKY_MIXED;
   free_factor(s);
   s->info.method = method;
-  if (method == BATTEN_SADDLE_ITERATIVE)
-    return batten_fail(s->ctx, BATTEN_E_INVALID, "opt.method: iterative is not built in; choose another method");
+  if (method == BATTEN_SADDLE_ITERATIVE) {
+    batten_saddle_qr_free(s); /* its levels have polynomials of their own */
+    return batten_saddle_iterative_new(s);
+  }
   if (method == BATTEN_SADDLE_LDL || method == BATTEN_SADDLE_QR) {
     batten_saddle_qr_free(s);
     return batten_saddle_dense_factor(s, method);
@@ -291,8 +308,7 @@ batten_status batten_saddle_begin_at(batten_context *ctx, batten_saddle *s, cons
 
 /* ---- Solve ---- */
 
-/* b [N+k] holds a right side of the caller's system and becomes its solution, once, unrefined. */
-static batten_status apply_factor(batten_saddle *s, double *b) {
+batten_status batten_saddle_apply(const batten_saddle *s, double *b) {
   size_t n = s->matrix.n, k = s->matrix.k;
   for (size_t i = 0; i < n; i++) b[i] *= s->scale;
   for (size_t c = 0; c < k; c++) b[n + c] *= s->p_scale[c];
@@ -355,7 +371,7 @@ static batten_status refine(batten_saddle *s, const double *f, double f_norm, do
   *stalled = false;
   s->info.residual = 1; /* of zero */
   for (unsigned step = 0;; step++) {
-    batten_status st = apply_factor(s, r);
+    batten_status st = batten_saddle_apply(s, r);
     if (st < 0) return st;
     for (size_t i = 0; i < order; i++) x[i] += r[i];
     st = residual(s, f, x, r);
@@ -383,6 +399,12 @@ batten_status batten_saddle_solve(batten_context *ctx, batten_saddle *s, const d
   if (bad < n) return batten_fail(ctx, BATTEN_E_INVALID, "f[%zu]: %g is not finite", bad, f[bad]);
 
   double start = batten_now(), f_norm = norm_max(n, f);
+  if (s->info.method == BATTEN_SADDLE_ITERATIVE) {
+    st = s->factored ? BATTEN_OK : factor_from(s, s->info.method);
+    if (st == BATTEN_OK) st = batten_saddle_iterative_solve(s, f, w, c);
+    if (st >= 0) s->info.time_solve_s = batten_now() - start;
+    return st;
+  }
   double *x = batten_alloc_array(ctx, order, 3 * sizeof *x);
   if (!x) return BATTEN_E_NOMEM;
   double *r = x + order, *best = r + order;

@@ -10,7 +10,8 @@
  *   rfp.c       Cholesky and BLAS-3 on a triangle in rectangular full packed storage, double or float
  *   project.c   QR of P, Householder projection, solves with the projected factor
  *   dense.c     LDL' and QR of the whole matrix
- *   saddle.c    the public calls: choice of method, memory, refinement, fall-back */
+ *   saddle.c    the public calls: choice of method, memory, refinement, fall-back
+ *   schwarz.h   the map of the iterative method */
 #ifndef BATTEN_SADDLE_SYSTEM_H
 #define BATTEN_SADDLE_SYSTEM_H
 
@@ -48,6 +49,7 @@ struct batten_saddle {
   batten_la_int *pivots; /* [N+k], LDL' */
   double *tau;           /* [N+k], QR */
 
+  struct saddle_iterative *iterative;
   double *begin; /* [N] where the next solve by iteration begins, NULL: at zero */
 };
 
@@ -56,6 +58,19 @@ struct batten_saddle {
 #define BATTEN_SADDLE_RCOND_MIN (32 * 0x1p-52)
 
 static inline size_t batten_saddle_order(const batten_saddle *s) { return s->matrix.n + s->matrix.k; }
+
+/* b [N+k] holds a right side of the caller's system and becomes its solution, once, unrefined, by the factor at hand.
+ */
+batten_status batten_saddle_apply(const batten_saddle *s, double *b);
+
+/* ---- iterative.c ---- */
+
+/* Bytes that set-up and solve take at their peak; s NULL: with default options. */
+size_t batten_saddle_iterative_bytes(const batten_saddle *s, size_t n, size_t k);
+batten_status batten_saddle_iterative_new(batten_saddle *s);
+void batten_saddle_iterative_free(batten_saddle *s);
+/* w, c for f; W_ACCURACY where direct rows miss options.accuracy. w may be f. */
+batten_status batten_saddle_iterative_solve(batten_saddle *s, const double *f, double *w, double *c);
 
 /* ---- tiles.c ---- */
 

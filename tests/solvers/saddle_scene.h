@@ -17,6 +17,7 @@ typedef struct scene {
   double *x;     /* [n][3] */
   double *p;     /* [k][n] */
   double *f;     /* [n] */
+  void *sums_state; /* of saddle_sums.h */
 } scene;
 
 static inline double scene_phi(scene_kernel kernel, double r2) {

@@ -1,0 +1,422 @@
+/* The iterative method: set-up, a solve, and what its result is called.
+ *
+ * The residual that the iteration sees belongs to its products, which are approximate, and says nothing of their
+ * error: with poor ones it falls to any tolerance while the solution stays wrong. So the rows of the system are
+ * summed up afresh, 1000 of them at random, and they alone decide. Where they miss what is asked for although the
+ * iteration has met it, the products are planned anew, more accurate, and the iteration goes on from where it is. */
+#include <float.h>
+#include <string.h>
+
+#include "base/arena.h"
+#include "schwarz.h"
+
+/* Products are the better for a margin: their error counts by |K w|, which is some ten times |Pi f|. */
+static const double PRODUCTS_MARGIN = 20;
+
+/* The iteration goes on to this part of the accuracy, so that the products' error finds room beside. */
+static const double ITERATION_MARGIN = 0.5;
+
+/* Of products: what double can give, and what the levels need. Errors there are rough at the size of a cell, which
+ * K^-1 amplifies: measured with the kernel r, iterations to 1e-9 of 40,000 and to 1e-6 of 1,000,000 unknowns with
+ * errors of 2e-3, 2e-4, 2e-5, 2e-7: more than 30, 11, 7, 9; and -, -, 19, 7. Smooth kernels stall below 1e-10. */
+static const double FLOOR = 1e-13, WITHIN_SMALL = 2e-5, WITHIN_LARGE = 2e-7, WITHIN_SMOOTH = 1e-11;
+enum { LARGE = 150000 };
+
+enum { ROWS_CHECKED = 1000, STEPS_EXPECTED = 24 };
+
+static double overlap_of(const batten_saddle_options *o) {
+  return o->overlap > 0 ? o->overlap : o->smooth_kernel ? 1 : 0.5;
+}
+
+static double first_accuracy(const batten_saddle_options *o) {
+  if (o->products_accuracy > 0) return fmax(o->products_accuracy, FLOOR);
+  double wanted = fmax(o->accuracy / PRODUCTS_MARGIN, FLOOR);
+  return o->smooth_kernel ? fmin(wanted, WITHIN_SMOOTH) : wanted;
+}
+
+static double accuracy_within(const batten_saddle_options *o, size_t n) {
+  return o->smooth_kernel ? WITHIN_SMOOTH : n > LARGE ? WITHIN_LARGE : WITHIN_SMALL;
+}
+
+/* ---- Memory ---- */
+
+static void grow(size_t *total, size_t count, size_t size) {
+  size_t bytes;
+  batten_mul(count, size, &bytes);
+  batten_add(*total, bytes, total);
+}
+
+static size_t plan_bytes(const batten_saddle_matrix *m, double accuracy, size_t rows, size_t cols) {
+  return m && m->sums && m->sums->bytes ? m->sums->bytes(m->user, accuracy, rows, cols) : 0;
+}
+
+/* Vectors of a solve: f less its polynomial, w, r, and where the next one begins; then those of the iteration. */
+static size_t vectors(batten_saddle_krylov krylov) {
+  return 4 + (krylov == BATTEN_SADDLE_CG ? 3 : 2 * STEPS_EXPECTED);
+}
+
+/* m: for its sums, NULL: they take nothing. */
+static size_t bytes_with(const batten_saddle_matrix *m, const batten_saddle_options *o, batten_saddle_krylov krylov,
+                         unsigned slots, size_t n, size_t k) {
+  const double overlap = overlap_of(o);
+  const batten_la_real real = o->smooth_kernel ? BATTEN_LA_DOUBLE : BATTEN_LA_FLOAT;
+  size_t count = n, held = sizeof(saddle_iterative), most = 0, cutting = 0;
+  if (n > SIZE_MAX / 4096) return SIZE_MAX;
+  grow(&held, k * (k + 2), sizeof(double));
+  grow(&held, batten_saddle_blocks(n) * SADDLE_DOTS, sizeof(double));
+  for (;;) {
+    grow(&held, count, (k + 2) * sizeof(double) + 2 * sizeof(size_t));
+    if (count <= SADDLE_EXACT_MAX) break;
+    size_t domains = batten_saddle_parts(count, SADDLE_OWN_MAX), own = count / domains + 1;
+    size_t members = own + saddle_added(own, overlap), next = batten_saddle_parts(count, SADDLE_CELL_MAX);
+    /* Domains have the size that halving gives, or twice that less one part where only some were too large. */
+    if (count / domains < SADDLE_OWN_MAX / 2) members = SADDLE_OWN_MAX + saddle_added(SADDLE_OWN_MAX, overlap);
+    grow(&held, count + saddle_added(count, overlap), sizeof(size_t));
+    grow(&held, domains, sizeof(saddle_domain));
+    grow(&held, domains, batten_saddle_domain_bytes(real, members, k));
+    if (members > most) most = members;
+    if (count == n) cutting = count * (6 * 3 + 6 + SADDLE_GRAPH) * sizeof(double);
+    batten_add(held, plan_bytes(m, accuracy_within(o, n), count, next), &held);
+    count = next;
+  }
+  batten_add(held, plan_bytes(m, first_accuracy(o), n, n), &held);
+  grow(&held, slots, batten_saddle_domain_scratch(most));
+  size_t exact = batten_saddle_bytes(BATTEN_SADDLE_CHOLESKY, count, k < count ? k : 0), peak = cutting;
+  size_t work = slots * batten_saddle_domain_work(most, k), solving = 0;
+  grow(&solving, n, vectors(krylov) * sizeof(double));
+  batten_add(solving, exact, &solving); /* its scratch is a part of that, and small */
+  if (work > peak) peak = work;
+  if (solving > peak) peak = solving;
+  batten_add(held, peak, &held);
+  return held;
+}
+
+size_t batten_saddle_iterative_bytes(const batten_saddle *s, size_t n, size_t k) {
+  batten_saddle_options o = s ? s->options : batten_saddle_options_default();
+  const batten_saddle_matrix *m = s ? &s->matrix : NULL;
+  const unsigned slots = s ? batten_workers(s->ctx) : 8;
+  batten_saddle_krylov krylov = o.krylov == BATTEN_SADDLE_KRYLOV_AUTO ? BATTEN_SADDLE_FGMRES : o.krylov;
+  size_t bytes = bytes_with(m, &o, krylov, slots, n, k);
+  if (s && o.krylov == BATTEN_SADDLE_KRYLOV_AUTO && bytes > batten_bytes_available(s->ctx))
+    bytes = bytes_with(m, &o, BATTEN_SADDLE_CG, slots, n, k);
+  return bytes;
+}
+
+static bool takes_cg(const batten_saddle *s) {
+  if (s->options.krylov != BATTEN_SADDLE_KRYLOV_AUTO) return s->options.krylov == BATTEN_SADDLE_CG;
+  size_t wanted =
+      bytes_with(&s->matrix, &s->options, BATTEN_SADDLE_FGMRES, batten_workers(s->ctx), s->matrix.n, s->matrix.k);
+  return wanted > batten_bytes_available(s->ctx);
+}
+
+/* ---- Set-up ---- */
+
+void batten_saddle_iterative_free(batten_saddle *s) {
+  saddle_iterative *it = s->iterative;
+  if (!it) return;
+  if (it->plan) it->sums.release(it->plan);
+  batten_saddle_links_free(it);
+  batten_saddle_free(it->exact);
+  batten_free(s->ctx, it->exact_x);
+  batten_saddle_levels_free(s, it);
+  batten_free(s->ctx, it->p_factor);
+  batten_free(s->ctx, it->p_pivots);
+  batten_free(s->ctx, it->partial);
+  batten_free(s->ctx, it->coefficients);
+  batten_free(s->ctx, it->scratch);
+  batten_free(s->ctx, it);
+  s->iterative = NULL;
+}
+
+static batten_status plan_products(batten_saddle *s, saddle_iterative *it, double accuracy) {
+  batten_status st = batten_progress(s->ctx, "plans", 1);
+  if (st < 0) return st;
+  if (it->plan) it->sums.release(it->plan);
+  it->plan = NULL;
+  it->accuracy = accuracy;
+  return it->sums.plan(s->matrix.user, s->ctx, accuracy, s->matrix.n, NULL, s->matrix.n, NULL, &it->plan);
+}
+
+static void count_domains(batten_saddle *s, const saddle_iterative *it, size_t before) {
+  s->info.levels = (unsigned)it->level_count;
+  s->info.domains = s->info.domains_double = 0;
+  for (size_t q = 0; q < it->level_count; q++)
+    for (size_t d = 0; d < it->levels[q].domain_count; d++) {
+      s->info.domains++;
+      s->info.domains_double += it->levels[q].domains[d].real == BATTEN_LA_DOUBLE;
+    }
+  size_t now = batten_bytes_in_use(s->ctx);
+  s->info.bytes = now > before ? now - before : 0;
+}
+
+batten_status batten_saddle_iterative_new(batten_saddle *s) {
+  const size_t k = s->matrix.k, n = s->matrix.n, before = batten_bytes_in_use(s->ctx);
+  double start = batten_now();
+  batten_status st = BATTEN_E_NOMEM;
+  saddle_iterative *it = batten_alloc(s->ctx, sizeof *it);
+  if (!it) return BATTEN_E_NOMEM;
+  *it = (saddle_iterative){.code = batten_saddle_code(), .sums = *s->matrix.sums, .slots = batten_workers(s->ctx)};
+  s->iterative = it;
+  it->fine_first = takes_cg(s);
+  it->p_factor = batten_alloc_array(s->ctx, k * k, sizeof *it->p_factor);
+  if (!it->p_factor) goto done;
+  memset(it->p_factor, 0, k * k * sizeof *it->p_factor);
+  it->p_pivots = batten_alloc_array(s->ctx, k, sizeof *it->p_pivots);
+  if (!it->p_pivots) goto done;
+  it->coefficients = batten_alloc_array(s->ctx, k, 2 * sizeof *it->coefficients);
+  if (!it->coefficients) goto done;
+  it->partial = batten_alloc_array(s->ctx, batten_saddle_blocks(n), SADDLE_DOTS * sizeof *it->partial);
+  if (!it->partial) goto done;
+
+  st = batten_saddle_levels_new(s, it, overlap_of(&s->options));
+  if (st < 0) goto done;
+  st = batten_saddle_domains_factor(s, it);
+  if (st < 0) goto done;
+  st = BATTEN_E_NOMEM;
+  it->scratch_bytes = batten_saddle_domain_scratch(it->domain_most);
+  it->scratch = batten_alloc_array(s->ctx, it->slots, it->scratch_bytes);
+  if (!it->scratch) goto done;
+  st = batten_saddle_exact_new(s, it);
+  if (st < 0) goto done;
+  st = batten_saddle_links_new(s, it, accuracy_within(&s->options, n));
+  if (st < 0) goto done;
+  if (n > 0) st = plan_products(s, it, first_accuracy(&s->options));
+  if (st < 0) goto done;
+  count_domains(s, it, before);
+  s->info.time_setup_s = batten_now() - start;
+done:
+  if (st < 0) batten_saddle_iterative_free(s);
+  return st;
+}
+
+/* ---- Direct rows ---- */
+
+typedef struct rows {
+  const batten_saddle *s;
+  const double *f, *w, *c;
+  const size_t *row;
+  size_t first, end;
+  double *residual; /* [rows] */
+  double *tiles;    /* [slots][TILE] */
+} rows;
+
+enum { TILE = 2048 };
+
+static void check_slot(void *arg, size_t slot) {
+  const rows *p = arg;
+  const batten_saddle_matrix *m = &p->s->matrix;
+  double *tile = p->tiles + slot * TILE;
+  for (size_t q = p->first + slot; q < p->end; q += p->s->iterative->slots) {
+    size_t i = p->row[q];
+    double sum = 0;
+    for (size_t j = 0; j < m->n; j += TILE) { /* the row as a part of a column: K is symmetric to the bit */
+      double part = 0;
+      size_t count = m->n - j < TILE ? m->n - j : TILE;
+      m->fill(m->user, j, count, i, 1, tile, TILE);
+      for (size_t l = 0; l < count; l++) part += tile[l] * p->w[j + l];
+      sum += part;
+    }
+    for (size_t a = 0; a < m->k; a++) sum += m->p[i + a * m->n] * p->c[a];
+    p->residual[q] = p->f[i] - sum;
+  }
+}
+
+/* Draws from splitmix64: the same rows every time. */
+static size_t draw(uint64_t *state, size_t n) {
+  uint64_t z = (*state += 0x9e3779b97f4a7c15u);
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+  return (size_t)((z ^ (z >> 31)) % n);
+}
+
+/* *out := 2-norm of f - K w - P c per row, over rows whose entries are computed afresh; relative to norm / sqrt(N).
+ */
+static batten_status check_rows(batten_saddle *s, const double *f, const double *w, const double *c, double norm,
+                                double *out) {
+  enum { ENTRIES = 1 << 24 }; /* between two progress calls: 0.1 s or so */
+  size_t n = s->matrix.n, count = n < ROWS_CHECKED ? n : ROWS_CHECKED, portion = ENTRIES / n + 1;
+  uint64_t state = 9;
+  batten_status st = BATTEN_E_NOMEM;
+  rows p = {.s = s, .f = f, .w = w, .c = c};
+  double *tiles = NULL, *residual = NULL;
+  size_t *row = batten_alloc_array(s->ctx, count, sizeof *row);
+  if (!row) goto done;
+  residual = batten_alloc_array(s->ctx, count, sizeof *residual);
+  if (!residual) goto done;
+  tiles = batten_alloc_array(s->ctx, s->iterative->slots, TILE * sizeof *tiles);
+  if (!tiles) goto done;
+  for (size_t q = 0; q < count; q++) row[q] = count == n ? q : draw(&state, n);
+  p.row = row;
+  p.residual = residual;
+  p.tiles = tiles;
+  for (p.first = 0; p.first < count; p.first = p.end) {
+    p.end = count - p.first < portion ? count : p.first + portion;
+    st = batten_progress(s->ctx, "check", (double)p.first / (double)count);
+    if (st < 0) goto done;
+    batten_parallel(s->ctx, s->iterative->slots, check_slot, &p);
+  }
+  double square = 0;
+  for (size_t q = 0; q < count; q++) square += residual[q] / norm * (residual[q] / norm);
+  *out = sqrt(square * ((double)n / (double)count));
+  s->info.rows_checked = count;
+  st = BATTEN_OK;
+done:
+  batten_free(s->ctx, tiles);
+  batten_free(s->ctx, residual);
+  batten_free(s->ctx, row);
+  return st;
+}
+
+/* ---- Solve ---- */
+
+typedef struct solve {
+  batten_saddle *s;
+  saddle_iterative *it;
+  const double *f;
+  double *pf, *w, *r; /* [N] Pi f, weights, Pi (f - K w) */
+  double *c;          /* [k] */
+  double norm;        /* |Pi f| */
+  double within;      /* |r| / norm, by the products */
+  double rows;        /* the same by direct rows: what counts */
+} solve;
+
+/* c from the coefficients Q'(f - K w). */
+static void polynomial(const solve *v, const double *coefficients) {
+  const saddle_iterative *it = v->it;
+  size_t k = v->s->matrix.k;
+  double *y = it->coefficients + k;
+  for (size_t j = k; j-- > 0;) {
+    double sum = coefficients[j];
+    for (size_t l = j + 1; l < k; l++) sum -= it->p_factor[j + l * k] * y[l];
+    y[j] = sum / it->p_factor[j + j * k];
+  }
+  for (size_t j = 0; j < k; j++) v->c[it->p_pivots[j]] = y[j] * v->s->p_scale[it->p_pivots[j]];
+}
+
+/* r and c for w. */
+static batten_status renew(solve *v) {
+  size_t n = v->s->matrix.n;
+  batten_status st = batten_progress(v->s->ctx, "iterate", 1);
+  if (st < 0) return st;
+  st = v->it->sums.apply(v->it->plan, v->s->ctx, v->w, v->r);
+  if (st < 0) return st;
+  for (size_t i = 0; i < n; i++) v->r[i] = v->f[i] - v->r[i];
+  batten_saddle_project(v->s, v->it, &v->it->levels[0], v->r, v->it->coefficients);
+  polynomial(v, v->it->coefficients);
+  v->within = batten_saddle_norm(v->s, v->it, n, v->r) / v->norm;
+  return BATTEN_OK;
+}
+
+/* Where the last solve ended, if that is nearer than zero. */
+static batten_status begin(solve *v) {
+  size_t n = v->s->matrix.n;
+  if (v->s->begin) {
+    memcpy(v->w, v->s->begin, n * sizeof *v->w);
+    batten_saddle_project(v->s, v->it, &v->it->levels[0], v->w, v->it->coefficients);
+    batten_status st = renew(v);
+    if (st < 0 || v->within < 1) return st;
+  }
+  memset(v->w, 0, n * sizeof *v->w);
+  memcpy(v->r, v->pf, n * sizeof *v->r);
+  v->within = 1;
+  return BATTEN_OK;
+}
+
+/* More accurate products: by what the direct rows miss, where the iteration has come that far; of the levels too
+ * where it has not. *done: there is nothing to gain. */
+static batten_status improve(solve *v, saddle_end end, bool *done) {
+  batten_saddle *s = v->s;
+  saddle_iterative *it = v->it;
+  bool met = end == SADDLE_MET;
+  double factor = met ? fmax(0.2 * s->options.accuracy / v->rows, 1e-4) : 0.01;
+  bool main_left = it->accuracy > FLOOR, levels_left = !met && it->level_count > 1 && it->accuracy_within > FLOOR;
+  *done = !main_left && !levels_left;
+  if (*done) return BATTEN_OK;
+  batten_status st = BATTEN_OK;
+  if (levels_left) st = batten_saddle_links_new(s, it, fmax(factor * it->accuracy_within, FLOOR));
+  if (st == BATTEN_OK && main_left) st = plan_products(s, it, fmax(factor * it->accuracy, FLOOR));
+  return st;
+}
+
+/* Iterates until the direct rows are content, or there is nothing left to try. */
+static batten_status iterate(solve *v) {
+  batten_saddle *s = v->s;
+  saddle_iterative *it = v->it;
+  const double target = ITERATION_MARGIN * s->options.accuracy * v->norm;
+  unsigned left = s->options.iterations_max;
+  double last = INFINITY;
+  batten_status st = begin(v);
+  while (st == BATTEN_OK) {
+    saddle_end end;
+    bool done = false;
+    st = (it->fine_first ? batten_saddle_cg : batten_saddle_fgmres)(s, it, v->w, v->r, v->norm, target, &left, &end);
+    if (st < 0) return st;
+    s->info.iterations = s->options.iterations_max - left;
+    st = renew(v);
+    if (st < 0) return st;
+    st = check_rows(s, v->f, v->w, v->c, v->norm, &v->rows);
+    if (st < 0 || v->rows <= s->options.accuracy || left == 0) return st;
+    /* Twice in vain: it is rounding, or the problem. */
+    bool gained = v->rows <= 0.5 * last;
+    if (!gained && end != SADDLE_SHORT && last < INFINITY) return BATTEN_OK;
+    last = v->rows;
+    if (end == SADDLE_SHORT && gained) continue;
+    st = improve(v, end, &done);
+    if (st < 0 || done) return st;
+    st = renew(v);
+  }
+  return st;
+}
+
+/* The weights for the next solve to begin at. */
+static batten_status keep(batten_saddle *s, const double *w) {
+  if (!s->begin) s->begin = batten_alloc_array(s->ctx, s->matrix.n, sizeof *s->begin);
+  if (!s->begin) return BATTEN_E_NOMEM;
+  memcpy(s->begin, w, s->matrix.n * sizeof *w);
+  return BATTEN_OK;
+}
+
+batten_status batten_saddle_iterative_solve(batten_saddle *s, const double *f, double *w, double *c) {
+  size_t n = s->matrix.n, k = s->matrix.k;
+  saddle_iterative *it = s->iterative;
+  solve v = {.s = s, .it = it, .f = f};
+  batten_status st = BATTEN_E_NOMEM;
+  v.c = batten_alloc_array(s->ctx, k, sizeof *v.c);
+  if (!v.c) goto done;
+  v.pf = batten_alloc_array(s->ctx, n, 3 * sizeof *v.pf);
+  if (!v.pf) goto done;
+  v.w = v.pf + n;
+  v.r = v.w + n;
+  if (n > 0) memcpy(v.pf, f, n * sizeof *f);
+  batten_saddle_project(s, it, &it->levels[0], v.pf, it->coefficients);
+  polynomial(&v, it->coefficients);
+  v.norm = batten_saddle_norm(s, it, n, v.pf);
+  s->info.iterations = 0;
+  s->info.residual_rows = 0;
+  s->info.rows_checked = 0;
+  /* A polynomial to rounding: no weights. */
+  if (v.norm <= 64 * DBL_EPSILON * batten_saddle_norm(s, it, n, f)) {
+    memset(v.w, 0, n * sizeof *v.w);
+    st = BATTEN_OK;
+  } else {
+    st = iterate(&v);
+    if (st < 0) goto done;
+    s->info.residual_rows = v.rows;
+  }
+  s->info.residual = s->info.residual_rows;
+  s->info.products_accuracy = it->accuracy;
+  st = keep(s, v.w);
+  if (st < 0) goto done;
+  if (n > 0) memcpy(w, v.w, n * sizeof *w);
+  if (k > 0) memcpy(c, v.c, k * sizeof *c);
+  if (!(s->info.residual_rows <= s->options.accuracy))
+    st = batten_fail(s->ctx, BATTEN_W_ACCURACY,
+                     "residual: %.3g on %zu rows after %u iterations, above opt.accuracy %.3g; %s",
+                     s->info.residual_rows, s->info.rows_checked, s->info.iterations, s->options.accuracy,
+                     s->info.iterations >= s->options.iterations_max ? "raise opt.iterations_max"
+                                                                     : "add a nugget, or raise opt.overlap");
+done:
+  batten_free(s->ctx, v.pf);
+  batten_free(s->ctx, v.c);
+  return st;
+}
