@@ -4,9 +4,9 @@
  * and halves its memory; where float finds no positive pivot (nearby points), or the caller knows K to be too smooth
  * for it, in double. Right sides are scaled to size 1 before they are rounded.
  *
- * P may have dependent columns on the members (a flat piece of surface): its columns are taken the largest first, as
- * many as are not zero. What is nothing but rounding may pass for one more: a direction more that is held fixed,
- * which costs nothing.
+ * P may have dependent columns on the members (a flat or straight piece of data): they are taken the largest first,
+ * and what is but rounding is left out. It would hold fixed a direction of no meaning, even a single unknown, which
+ * then no domain solves for: three straight lines of points took 66 iterations instead of 41.
  *
  * Domains are worked on by tasks of batten's own loop, by our own code: see panels.h. */
 #include <string.h>
@@ -15,6 +15,9 @@
 
 /* A pivot below this part of its diagonal is rounding. */
 static const double LEAST_FLOAT = 32 * 0x1p-23, LEAST_DOUBLE = 4 * 0x1p-52;
+
+/* Columns of P have size 1; what is left of one that depends on others is below this, root mean square. */
+static const double DEPENDENT = 1e-14;
 
 /* ---- Memory ---- */
 
@@ -84,7 +87,7 @@ static void make_reflectors(const batten_saddle *s, saddle_domain *d, const size
     }
     double *column = p + best * count;
     for (size_t i = at; i < count; i++) largest = fmax(largest, fabs(column[i]));
-    if (!(most > 0)) return;
+    if (!(most > DEPENDENT * DEPENDENT * (double)count)) return;
     double *v = d->reflectors + at * count;
     d->tau[at] = reflector(count, at, largest, column, v);
     if (best != at) memcpy(column, p + at * count, count * sizeof *column);

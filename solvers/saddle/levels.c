@@ -1,9 +1,10 @@
 /* Nested levels of the unknowns, and the domains of each.
  *
  * A kd-tree halves the points of a level down to cells of at most 8. In each cell the one next to the middle of the
- * cell's box goes to the next level, which so has an eighth of the unknowns or somewhat more, spread as they are. The
- * halves of at most 512 are the domains' own unknowns. A domain grows beyond them along the graph of the nearest
- * neighbours, ring by ring: by distance to its box it would starve on the side where points are sparse. */
+ * cell's box goes to the next level, which so has an eighth of the unknowns or somewhat more, spread as they are;
+ * with the extreme ones along each axis, as an outlier alone holds a polynomial. The halves of at most 512 are the
+ * domains' own unknowns. A domain grows beyond them along the graph of the nearest neighbours, ring by ring: by
+ * distance to its box it would starve on the side where points are sparse. */
 #include <string.h>
 
 #include "base/neighbours.h"
@@ -261,17 +262,31 @@ static size_t middle_of(unsigned dimension, const double *x, const size_t *cell,
   return best;
 }
 
+/* The least and the largest along each axis. */
+static void choose_extremes(unsigned dimension, size_t count, const double *x, size_t *chosen) {
+  for (unsigned d = 0; d < dimension; d++) {
+    size_t least = 0, most = 0;
+    for (size_t i = 1; i < count; i++) {
+      if (x[i * dimension + d] < x[least * dimension + d]) least = i;
+      if (x[i * dimension + d] > x[most * dimension + d]) most = i;
+    }
+    chosen[least] = chosen[most] = 1;
+  }
+}
+
 /* The next level's places on this one and its unknowns, increasing. chosen [count]: zeros. */
 static batten_status make_next(const batten_saddle *s, const saddle_level *l, const size_t *order, unsigned dimension,
                                const double *x, size_t *chosen, saddle_level *next) {
   halves cells = halves_of(l->count, SADDLE_CELL_MAX);
-  size_t low, high, at = 0;
-  next->count = batten_saddle_parts(l->count, SADDLE_CELL_MAX);
-  next->parent = batten_alloc_array(s->ctx, next->count, sizeof *next->parent);
-  if (!next->parent) return BATTEN_E_NOMEM;
-  next->index = batten_alloc_array(s->ctx, next->count, sizeof *next->index);
-  if (!next->index) return BATTEN_E_NOMEM;
+  size_t low, high, at = 0, count = 0;
   while (next_half(&cells, &low, &high)) chosen[middle_of(dimension, x, order + low, high - low)] = 1;
+  choose_extremes(dimension, l->count, x, chosen);
+  for (size_t i = 0; i < l->count; i++) count += chosen[i];
+  next->count = count;
+  next->parent = batten_alloc_array(s->ctx, count, sizeof *next->parent);
+  if (!next->parent) return BATTEN_E_NOMEM;
+  next->index = batten_alloc_array(s->ctx, count, sizeof *next->index);
+  if (!next->index) return BATTEN_E_NOMEM;
   for (size_t i = 0; i < l->count; i++) {
     if (!chosen[i]) continue;
     next->parent[at] = i;

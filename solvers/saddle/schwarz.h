@@ -19,6 +19,7 @@
 #include "system.h"
 
 enum {
+  SADDLE_EXTREMES = 6,     /* unknowns that a level may have beyond one for each cell */
   SADDLE_LEVELS_MAX = 20,  /* each has less than a third of the one before */
   SADDLE_EXACT_MAX = 3000, /* unknowns that are solved exactly; between 1000 and 5000 the iterations are the same */
   SADDLE_OWN_MAX = 512,    /* unknowns of a domain without the overlap: the domains have 256 to 512 */

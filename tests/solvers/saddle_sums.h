@@ -152,4 +152,88 @@ static batten_saddle_sums direct_sums(scene *s, direct *d) {
                               .entries = direct_entries};
 }
 
+typedef struct answer {
+  batten_status status;
+  batten_saddle_info info;
+  double *w, c[10];
+} answer;
+
+static inline answer answer_new(size_t n) { return (answer){.w = calloc(n + 1, sizeof(double))}; }
+
+static inline batten_saddle_options iterative_options(double accuracy) {
+  batten_saddle_options o = batten_saddle_options_default();
+  o.method = BATTEN_SADDLE_ITERATIVE;
+  o.accuracy = accuracy;
+  return o;
+}
+
+/* Factors and solves; sums are d's, whose counts are looked at by the caller. */
+static inline void solve(batten_context *ctx, scene *s, direct *d, const batten_saddle_options *o, answer *a) {
+  batten_saddle_sums sums = direct_sums(s, d);
+  batten_saddle_matrix m = scene_matrix(s);
+  batten_saddle *h = NULL;
+  m.sums = &sums;
+  a->status = batten_saddle_factor(ctx, &m, o, &h);
+  if (a->status == BATTEN_OK) {
+    a->status = batten_saddle_solve(ctx, h, s->f, a->w, a->c);
+    a->info = batten_saddle_get_info(h);
+  }
+  batten_saddle_free(h);
+  if (d->live != 0) t_line(false, "%zu plans left over", d->live);
+}
+
+/* A sphere with bumps, random points on it: the ball's distance as data. */
+static inline scene bumpy_sphere(scene_kernel kernel, size_t n, uint64_t seed) {
+  scene s = scene_new(SCENE_SPHERE, kernel, n, 4, seed);
+  for (size_t i = 0; i < n; i++) {
+    double *x = s.x + 3 * i,
+           r = 0.35 * (1 + 0.1 * sin(5 * x[0]) * sin(5 * x[1]) * sin(5 * x[2]) + 0.05 * sin(9 * x[2]));
+    for (int a = 0; a < 3; a++) x[a] = 0.5 + r * x[a];
+    for (size_t c = 1; c < s.k; c++) s.p[i + c * n] = x[c - 1];
+    s.f[i] = 0.35 - r;
+  }
+  return s;
+}
+
+/* f: smooth, not random. */
+static inline void smooth_data(scene *s) {
+  for (size_t i = 0; i < s->n; i++) s->f[i] = sin(3 * s->x[3 * i]) + s->x[3 * i + 1] * s->x[3 * i + 2];
+}
+
+static inline void polynomials(scene *s) {
+  for (size_t i = 0; i < s->n; i++)
+    for (size_t c = 1; c < s->k && c < 4; c++) s->p[i + c * s->n] = s->x[3 * i + c - 1];
+}
+
+/* 2-norm of f - K w - P c over all rows, over that of f less its mean: no less than what the method promises by. */
+static inline double residual_of(const scene *s, const answer *a, const double *c) {
+  double square = 0, all = 0, mean = 0;
+  double *column = malloc((s->n + 1) * sizeof *column);
+  for (size_t i = 0; i < s->n; i++) mean += s->f[i] / (double)s->n;
+  for (size_t i = 0; i < s->n; i++) {
+    double r = s->f[i];
+    scene_fill(s, 0, s->n, i, 1, column, s->n);
+    for (size_t j = 0; j < s->n; j++) r -= column[j] * a->w[j];
+    for (size_t q = 0; q < s->k; q++) r -= s->p[i + q * s->n] * c[q];
+    square += r * r;
+    all += (s->f[i] - mean) * (s->f[i] - mean);
+  }
+  free(column);
+  return sqrt(square / all);
+}
+
+static inline double orthogonality_of(const scene *s, const answer *a) {
+  double worst = 0, total = 0;
+  for (size_t i = 0; i < s->n; i++) total += fabs(a->w[i]);
+  for (size_t q = 0; q < s->k; q++) {
+    double sum = 0, most = 0;
+    for (size_t i = 0; i < s->n; i++) {
+      sum += s->p[i + q * s->n] * a->w[i];
+      most = fmax(most, fabs(s->p[i + q * s->n]));
+    }
+    worst = fmax(worst, fabs(sum) / (most * total));
+  }
+  return worst;
+}
+
 #endif
