@@ -1,4 +1,4 @@
-/* Plans of sums of radial kernels: making, applying, judging. See <batten/fmm.h>, and fmm_inner.h for a map. */
+/* Plans of sums of radial kernels: making and applying. See <batten/fmm.h>, and fmm_inner.h for a map. */
 #include "fmm/fmm_inner.h"
 
 #include "base/checked.h"
@@ -9,15 +9,29 @@ batten_fmm_options batten_fmm_options_default(void) {
   return (batten_fmm_options){.struct_size = sizeof(batten_fmm_options), .accuracy = 1e-8};
 }
 
-size_t batten_fmm_bytes(const batten_radial *kernel, size_t source_count, size_t target_count,
-                        const batten_fmm_options *opt) {
-  (void)opt;
-  size_t points, bytes;
-  batten_add(source_count, target_count, &points);
-  batten_mul3(points, (3 * kernel->n + 2), sizeof(double), &bytes);
-  batten_add(bytes, sizeof(batten_fmm), &bytes);
-  return bytes;
+/* ---- direct or fast ---- */
+
+/* Terms below which a tree is not even tried: some hundredths of a second at most, and less than its set-up. */
+static const double DIRECT_TERMS = 4e6;
+
+/* Points of a leaf: as many as make direct sums cost about what the translations do. */
+static size_t leaf_points(unsigned n, unsigned order) {
+  if (n == 2) return 8 * (size_t)order;
+  return order <= 6 ? 96 : order <= 9 ? 160 : 256;
 }
+
+/* Whether terms summed directly cost less than what is left of them and the far fields. In units of a term of near.c
+ * (0.4 ns): an operation of a small product costs a fortieth of it, those of polynomials an eighth. */
+static bool is_direct_cheaper(const batten_fmm *f, fmm_orders orders) {
+  const double order = orders.order, n = f->kernel.n, full = pow(order, n), rank = (double)batten_fmm_rank_guess(f->kernel.n, orders.order);
+  const double translations = (double)f->lists.kind_begin[f->lists.chunks * FMM_KINDS];
+  const double points = (double)f->tree.sources.count + (double)f->tree.targets.count;
+  const double fast = (double)f->lists.pairs + (double)f->lists.node_terms + translations * 2 * rank * rank / 40 +
+                      (points * 2 * full + (double)f->tree.cells * 8 * n * full * order) / 8;
+  return (double)f->sources.count * (double)f->targets.count < fast;
+}
+
+/* ---- making ---- */
 
 static batten_status copy_points(batten_context *ctx, unsigned n, size_t count, const double *from, fmm_points *to) {
   to->block = batten_alloc_array(ctx, count * n, sizeof *to->block);
@@ -30,6 +44,48 @@ static batten_status copy_points(batten_context *ctx, unsigned n, size_t count, 
   return BATTEN_OK;
 }
 
+/* Tree and lists, unless direct sums are cheaper; f->tree.cells = 0 then. */
+static batten_status plan_tree(batten_context *ctx, batten_fmm *f, fmm_orders orders) {
+  const unsigned n = f->kernel.n;
+  if ((double)f->sources.count * (double)f->targets.count <= DIRECT_TERMS) return BATTEN_OK;
+  if (f->sources.count > UINT32_MAX || f->targets.count > UINT32_MAX)
+    return batten_fail(ctx, BATTEN_E_TOO_LARGE, "%zu sources and %zu targets; each must be below 2^32",
+                       f->sources.count, f->targets.count);
+  size_t full = 1;
+  for (unsigned a = 0; a < n; a++) full *= orders.order;
+  batten_status st = batten_fmm_tree_new(ctx, n, &f->sources, &f->targets, f->same, leaf_points(n, orders.order),
+                                         &f->tree);
+  if (st < 0) return st;
+  if ((st = batten_fmm_lists_new(ctx, n, full, &f->tree, &f->lists)) < 0) return st;
+  if (!is_direct_cheaper(f, orders)) return BATTEN_OK;
+  batten_fmm_lists_free(ctx, &f->lists);
+  batten_fmm_tree_free(ctx, &f->tree);
+  return BATTEN_OK;
+}
+
+/* Operators, shared or new. */
+static batten_status plan_operators(batten_context *ctx, batten_fmm *f, fmm_orders orders, const batten_fmm *share) {
+  const double start = batten_now();
+  if (share && share->operators) {
+    f->operators = batten_fmm_operators_retain(share->operators);
+    return BATTEN_OK;
+  }
+  batten_status st = batten_fmm_operators_new(ctx, &f->kernel, orders, &f->operators);
+  f->info.time_operators_s = batten_now() - start;
+  return st;
+}
+
+static void describe(batten_fmm *f) {
+  batten_fmm_info *i = &f->info;
+  i->order = f->operators->order;
+  i->rank = f->operators->rank;
+  i->levels = f->tree.levels;
+  i->cells = f->tree.cells;
+  i->leaves = f->tree.leaves;
+  i->pairs = f->lists.pairs;
+  i->translations = f->lists.kind_begin[f->lists.chunks * FMM_KINDS];
+}
+
 batten_status batten_fmm_create(batten_context *ctx, const batten_radial *kernel, size_t source_count,
                                 const double *sources, size_t target_count, const double *targets,
                                 const batten_fmm_options *opt, batten_fmm **out) {
@@ -40,6 +96,7 @@ batten_status batten_fmm_create(batten_context *ctx, const batten_radial *kernel
   if (st < 0) return st;
   const double start = batten_now();
   const size_t before = batten_bytes_in_use(ctx);
+  const fmm_orders orders = batten_fmm_orders(kernel, options.accuracy, options.gradients || options.dipoles);
   st = BATTEN_E_NOMEM;
   batten_fmm *f = batten_alloc(ctx, sizeof *f);
   if (!f) goto done;
@@ -47,12 +104,27 @@ batten_status batten_fmm_create(batten_context *ctx, const batten_radial *kernel
                     .kernel = *kernel,
                     .accuracy = options.accuracy,
                     .gradients = options.gradients,
-                    .dipoles = options.dipoles};
+                    .dipoles = options.dipoles,
+                    .same = !targets};
   if ((st = copy_points(ctx, kernel->n, source_count, sources, &f->sources)) < 0) goto done;
-  if ((st = copy_points(ctx, kernel->n, target_count, targets ? targets : sources, &f->targets)) < 0) goto done;
-  f->info = (batten_fmm_info){.direct = 1, .bytes = batten_bytes_in_use(ctx) - before};
-  batten_mul(source_count, target_count, &f->info.pairs);
-  f->info.time_plan_s = batten_now() - start;
+  if (f->same) {
+    f->targets = f->sources;
+    f->targets.block = NULL;
+  } else if ((st = copy_points(ctx, kernel->n, target_count, targets, &f->targets)) < 0) {
+    goto done;
+  }
+  if ((st = plan_tree(ctx, f, orders)) < 0) goto done;
+  if (f->tree.cells) {
+    if ((st = plan_operators(ctx, f, orders, options.share)) < 0) goto done;
+    if ((st = batten_fmm_work_new(ctx, f)) < 0) goto done;
+    describe(f);
+  } else {
+    f->info.direct = 1;
+    batten_mul(source_count, target_count, &f->info.pairs);
+  }
+  f->info.bytes = batten_bytes_in_use(ctx) - before;
+  if (options.share && options.share->operators == f->operators && f->operators) f->info.bytes += f->operators->bytes;
+  f->info.time_plan_s = batten_now() - start - f->info.time_operators_s;
   *out = f;
   f = NULL;
 done:
@@ -60,63 +132,45 @@ done:
   return st;
 }
 
-/* ---- direct sums ---- */
-
-/* Sums over all sources at some targets, or all of them. */
-typedef struct direct_sums {
-  const batten_fmm *fmm;
-  fmm_near_function *near;
-  fmm_terms terms;
-  size_t count;      /* of targets */
-  const size_t *at;  /* [count] which ones; NULL: 0 .. count - 1 */
-  double *sums;      /* [FMM_SUMS][count] */
-  size_t first_task; /* of the piece that runs */
-} direct_sums;
-
-enum { TASK_TARGETS = 64 };
-
-static void direct_task(void *arg, size_t index) {
-  const direct_sums *d = arg;
-  const size_t begin = (d->first_task + index) * TASK_TARGETS;
-  const size_t end = d->count - begin < TASK_TARGETS ? d->count : begin + TASK_TARGETS;
-  for (size_t i0 = begin; i0 < end; i0 += FMM_LANES) {
-    double x[3][FMM_LANES] = {{0}}, sums[FMM_SUMS][FMM_LANES] = {{0}};
-    for (size_t lane = 0; lane < FMM_LANES; lane++) {
-      const size_t i = i0 + lane < end ? i0 + lane : end - 1; /* lanes left over repeat the last point */
-      for (unsigned a = 0; a < d->fmm->kernel.n; a++) x[a][lane] = d->fmm->targets.x[a][d->at ? d->at[i] : i];
-    }
-    d->near(&d->terms, 0, d->fmm->sources.count, (const double(*)[FMM_LANES])x, sums);
-    for (size_t lane = 0; lane < FMM_LANES && i0 + lane < end; lane++)
-      for (unsigned q = 0; q < FMM_SUMS; q++) d->sums[q * d->count + i0 + lane] = sums[q][lane];
-  }
+void batten_fmm_free(batten_fmm *f) {
+  if (!f) return;
+  batten_fmm_work_free(f->ctx, &f->work);
+  batten_fmm_operators_free(f->operators);
+  batten_fmm_lists_free(f->ctx, &f->lists);
+  batten_fmm_tree_free(f->ctx, &f->tree);
+  batten_free(f->ctx, f->targets.block);
+  batten_free(f->ctx, f->sources.block);
+  batten_free(f->ctx, f);
 }
 
-/* Terms between two calls of the host's progress callback: some hundredths of a second. */
-static const size_t TERMS_PROGRESS = 64000000;
+batten_fmm_info batten_fmm_get_info(const batten_fmm *fmm) { return fmm->info; }
 
-/* Weights and dipoles as the inner loops read them, then the sums. */
-static batten_status sum_directly(batten_context *ctx, direct_sums *d, const double *weights, const double *dipoles,
-                                  bool gradients) {
-  const size_t sources = d->fmm->sources.count, n = d->fmm->kernel.n;
-  batten_status st = BATTEN_OK;
-  double *block = batten_alloc_array(ctx, sources * (dipoles ? 1 + n : 1), sizeof *block);
-  if (!block) return BATTEN_E_NOMEM;
-  for (unsigned a = 0; a < n; a++) d->terms.x[a] = d->fmm->sources.x[a];
-  for (size_t j = 0; j < sources; j++) block[j] = weights ? weights[j] : 0;
-  for (unsigned a = 0; a < n && dipoles; a++) {
-    for (size_t j = 0; j < sources; j++) block[(1 + a) * sources + j] = dipoles[j * n + a];
-    d->terms.g[a] = block + (1 + a) * sources;
+/* ---- applying ---- */
+
+static batten_status apply_directly(batten_context *ctx, batten_fmm *f, const double *weights, const double *dipoles,
+                                    double *values, double *gradients) {
+  const size_t count = f->targets.count, n = f->kernel.n;
+  double *sums = batten_alloc_array(ctx, count, FMM_SUMS * sizeof *sums);
+  if (!sums) return BATTEN_E_NOMEM;
+  const batten_status st = batten_fmm_direct(ctx, f, weights, dipoles, gradients != NULL, count, NULL, sums);
+  if (st >= 0 && values && count) memcpy(values, sums, count * sizeof *values);
+  for (unsigned a = 0; a < n && gradients && st >= 0; a++)
+    for (size_t i = 0; i < count; i++) gradients[i * n + a] = sums[(1 + a) * count + i];
+  batten_free(ctx, sums);
+  return st;
+}
+
+static batten_status apply_fast(batten_context *ctx, batten_fmm *f, const double *weights, const double *dipoles,
+                                double *values, double *gradients) {
+  const size_t count = f->tree.targets.count, n = f->kernel.n;
+  const double *sums = f->work.sums;
+  const batten_status st = batten_fmm_passes(ctx, f, weights, dipoles, gradients != NULL);
+  if (st < 0) return st;
+  for (size_t i = 0; i < f->targets.count; i++) {
+    const size_t j = f->tree.target_place[i];
+    if (values) values[i] = sums[j];
+    for (unsigned a = 0; a < n && gradients; a++) gradients[i * n + a] = sums[(1 + a) * count + j];
   }
-  d->terms.w = block;
-  d->near = batten_fmm_lanes_now()->near((unsigned)n, (unsigned)d->fmm->kernel.power, gradients, dipoles != NULL);
-  const size_t tasks = (d->count + TASK_TARGETS - 1) / TASK_TARGETS;
-  const size_t piece = TERMS_PROGRESS / TASK_TARGETS / (sources ? sources : 1) + 1;
-  for (size_t first = 0; first < tasks && st >= 0; first += piece) {
-    st = batten_progress(ctx, "sums", (double)first / (double)tasks);
-    d->first_task = first;
-    if (st >= 0) batten_parallel(ctx, tasks - first < piece ? tasks - first : piece, direct_task, d);
-  }
-  batten_free(ctx, block);
   return st;
 }
 
@@ -130,80 +184,20 @@ batten_status batten_fmm_apply(batten_context *ctx, batten_fmm *fmm, const doubl
   batten_status st = batten_fmm_check_weights(ctx, fmm, weights, dipoles);
   if (st < 0) return st;
   const double start = batten_now();
-  const size_t count = fmm->targets.count, n = fmm->kernel.n;
-  direct_sums d = {.fmm = fmm, .count = count};
-  d.sums = batten_alloc_array(ctx, count, FMM_SUMS * sizeof *d.sums);
-  if (!d.sums) return BATTEN_E_NOMEM;
-  st = sum_directly(ctx, &d, weights, dipoles, gradients != NULL);
-  if (st < 0) goto done;
-  if (values && count) memcpy(values, d.sums, count * sizeof *values);
-  for (unsigned a = 0; a < n && gradients; a++)
-    for (size_t i = 0; i < count; i++) gradients[i * n + a] = d.sums[(1 + a) * count + i];
-  fmm->info.time_apply_s = batten_now() - start;
-done:
-  batten_free(ctx, d.sums);
+  st = (fmm->operators ? apply_fast : apply_directly)(ctx, fmm, weights, dipoles, values, gradients);
+  if (st >= 0) fmm->info.time_apply_s = batten_now() - start;
   return st;
 }
 
-/* ---- judging ---- */
+/* ---- memory told beforehand ---- */
 
-/* Rows out of count, drawn without repetition and in order by Knuth's algorithm S; splitmix64 for the numbers. */
-static void draw_rows(size_t count, size_t rows, uint64_t seed, size_t *at) {
-  for (size_t i = 0, taken = 0; taken < rows; i++) {
-    uint64_t z = (seed += 0x9e3779b97f4a7c15u);
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    const double u = (double)((z ^ (z >> 31)) >> 11) * 0x1p-53;
-    if (u * (double)(count - i) < (double)(rows - taken)) at[taken++] = i;
-  }
-}
-
-/* Norm of the difference to columns q0 .. q1 - 1 of the direct sums, over their norm. */
-static double relative_error(const direct_sums *d, unsigned q0, unsigned q1, const double *given, size_t stride) {
-  double largest = 0, difference = 0, norm = 0;
-  for (size_t i = q0 * d->count; i < q1 * d->count; i++) largest = fmax(largest, fabs(d->sums[i]));
-  const double unit = largest > 0 ? batten_unit(largest) : 1; /* so that squares neither over- nor underflow */
-  for (unsigned q = q0; q < q1; q++)
-    for (size_t i = 0; i < d->count; i++) {
-      const double sum = d->sums[q * d->count + i], e = given[d->at[i] * stride + q - q0] - sum;
-      difference += (e * unit) * (e * unit);
-      norm += (sum * unit) * (sum * unit);
-    }
-  return difference == 0 ? 0 : sqrt(difference / norm);
-}
-
-batten_status batten_fmm_error(batten_context *ctx, const batten_fmm *fmm, const double *weights,
-                               const double *dipoles, const double *values, const double *gradients, size_t rows,
-                               uint64_t seed, double *value_error, double *gradient_error) {
-  if (!ctx) return BATTEN_E_INVALID;
-  if (!fmm) return batten_fail(ctx, BATTEN_E_INVALID, "fmm: NULL; make it with batten_fmm_create()");
-  if (!values != !value_error || !gradients != !gradient_error)
-    return batten_fail(ctx, BATTEN_E_INVALID, "%s: NULL without the other of the pair; give both or none",
-                       !values != !value_error ? "values, value_error" : "gradients, gradient_error");
-  batten_status st = batten_fmm_check_weights(ctx, fmm, weights, dipoles);
-  if (st < 0) return st;
-  direct_sums d = {.fmm = fmm, .count = rows < fmm->targets.count ? rows : fmm->targets.count};
-  size_t *at = batten_alloc_array(ctx, d.count, sizeof *at);
-  d.sums = batten_alloc_array(ctx, d.count, FMM_SUMS * sizeof *d.sums);
-  st = BATTEN_E_NOMEM;
-  if (!at || !d.sums) goto done;
-  draw_rows(fmm->targets.count, d.count, seed, at);
-  d.at = at;
-  st = sum_directly(ctx, &d, weights, dipoles, gradients != NULL);
-  if (st < 0) goto done;
-  if (value_error) *value_error = relative_error(&d, 0, 1, values, 1);
-  if (gradient_error) *gradient_error = relative_error(&d, 1, 1 + fmm->kernel.n, gradients, fmm->kernel.n);
-done:
-  batten_free(ctx, d.sums);
-  batten_free(ctx, at);
-  return st;
-}
-
-batten_fmm_info batten_fmm_get_info(const batten_fmm *fmm) { return fmm->info; }
-
-void batten_fmm_free(batten_fmm *fmm) {
-  if (!fmm) return;
-  batten_free(fmm->ctx, fmm->targets.block);
-  batten_free(fmm->ctx, fmm->sources.block);
-  batten_free(fmm->ctx, fmm);
+size_t batten_fmm_bytes(const batten_radial *kernel, size_t source_count, size_t target_count,
+                        const batten_fmm_options *opt) {
+  const batten_fmm_options options = opt ? *opt : batten_fmm_options_default();
+  size_t points, bytes;
+  batten_add(source_count, target_count, &points);
+  batten_mul3(points, (3 * kernel->n + 2), sizeof(double), &bytes);
+  (void)options;
+  batten_add(bytes, sizeof(batten_fmm), &bytes);
+  return bytes;
 }

@@ -1,4 +1,4 @@
-/* Direct sums, for one instruction set (see lanes.h).
+/* Direct sums, and panels of the matrix phi(|x - y|), for one instruction set (see lanes.h).
  *
  * FMM_LANES targets go side by side through the loop over the sources: the compiler turns each loop over the lanes into
  * a few vector instructions and keeps the sums in registers. Each kernel, dimension and kind of term has its own
@@ -69,4 +69,31 @@ fmm_near_function *FMM_OF_SET(batten_fmm_near)(unsigned n, unsigned power, int g
                 {near_##n##_##power##_1_0, near_##n##_##power##_1_1}},
       KERNELS(ROW)};
   return n < 4 && power < 8 ? functions[n][power][gradients != 0][dipoles != 0] : NULL;
+}
+
+BATTEN_ALWAYS_INLINE void fill(unsigned n, unsigned power, const double rows[3][FMM_PANEL], size_t count,
+                               const double *const columns[3], double *panel) {
+  for (size_t j = 0; j < count; j++, panel += FMM_PANEL) {
+    const double x = columns[0][j], y = columns[1][j], z = n > 2 ? columns[2][j] : 0;
+    LANES_LOOP(unsigned i = 0; i < FMM_PANEL; i++) {
+      const double dx = rows[0][i] - x, dy = rows[1][i] - y, dz = n > 2 ? rows[2][i] - z : 0;
+      double d2 = dx * dx + dy * dy;
+      if (n > 2) d2 += dz * dz;
+      panel[i] = batten_green_radial(power, 0, d2).f0;
+    }
+  }
+}
+
+#define FILL_FUNCTION(n, power)                                                                                  \
+  static void fill_##n##_##power(const double rows[3][FMM_PANEL], size_t count, const double *const columns[3],  \
+                                 double *panel) {                                                                \
+    fill(n, power, rows, count, columns, panel);                                                                 \
+  }
+KERNELS(FILL_FUNCTION)
+
+fmm_fill_function *FMM_OF_SET(batten_fmm_fill)(unsigned n, unsigned power) {
+  static fmm_fill_function *const functions[4][8] = {
+#define FILL_ROW(n, power) [n][power] = fill_##n##_##power,
+      KERNELS(FILL_ROW)};
+  return n < 4 && power < 8 ? functions[n][power] : NULL;
 }
