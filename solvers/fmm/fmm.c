@@ -191,13 +191,46 @@ batten_status batten_fmm_apply(batten_context *ctx, batten_fmm *fmm, const doubl
 
 /* ---- memory told beforehand ---- */
 
+/* Sums that stay too large once they are. */
+static size_t plus(size_t a, size_t b) {
+  size_t sum;
+  batten_add(a, b, &sum);
+  return sum;
+}
+static size_t times(size_t a, size_t b) {
+  size_t product;
+  batten_mul(a, b, &product);
+  return product;
+}
+
+/* Operators, what they are made in, and their copies for each level where the kernel has a logarithm. */
+static size_t operator_doubles(const batten_radial *kernel, fmm_orders orders, size_t full, size_t levels) {
+  const size_t n = kernel->n, kinds = n == 2 ? 12 : 56, half = (orders.order + 1) / 2;
+  const size_t rank = batten_fmm_rank_guess(kernel->n, orders.order), stride = rank + FMM_PANEL;
+  const size_t transfers = kinds * stride * rank, samples = (6 * (n == 2 ? half * half : half * half * half) + kinds);
+  const size_t sampling = samples * (kernel->logarithm ? 2 : 1) * 3 * full, making = 2 * stride * full + 8 * 90 * full;
+  return transfers * (kernel->logarithm ? 2 + levels : 1) + (sampling > making ? sampling : making);
+}
+
 size_t batten_fmm_bytes(const batten_radial *kernel, size_t source_count, size_t target_count,
                         const batten_fmm_options *opt) {
-  const batten_fmm_options options = opt ? *opt : batten_fmm_options_default();
-  size_t points, bytes;
-  batten_add(source_count, target_count, &points);
-  batten_mul3(points, (3 * kernel->n + 2), sizeof(double), &bytes);
-  (void)options;
-  batten_add(bytes, sizeof(batten_fmm), &bytes);
-  return bytes;
+  const batten_fmm_options o = opt ? *opt : batten_fmm_options_default();
+  const size_t n = kernel->n, leaf_split = n == 2 ? 6 : 10; /* 2^n / (1 - 2^-n): cells for leaves that are 2^-n full */
+  const size_t points = plus(source_count, target_count);
+  /* Copies in the caller's order and in that of the tree, places, records with their spare, terms and sums. */
+  size_t bytes = plus(sizeof(batten_fmm), times(points, 2 * n * sizeof(double) + 4 + 64 + 5 * sizeof(double)));
+  if ((double)source_count * (double)target_count <= DIRECT_TERMS) return bytes;
+  const fmm_orders orders = batten_fmm_orders(kernel, o.accuracy, o.gradients || o.dipoles);
+  const size_t leaf = leaf_points(kernel->n, orders.order), full = n == 2 ? orders.order * orders.order
+                                                                         : orders.order * orders.order * orders.order;
+  const size_t stride = batten_fmm_rank_guess(kernel->n, orders.order) + FMM_PANEL;
+  const size_t of_tree = source_count == target_count ? source_count : points; /* one cloud as a rule, or two */
+  const size_t cells = plus(times(of_tree / leaf, leaf_split), 64);
+  const size_t lists = n == 2 ? 27 * sizeof(fmm_translation) + 9 * 4 : 189 * sizeof(fmm_translation) + 27 * 4;
+  const size_t each = (full + 2 * stride) * sizeof(double) + sizeof(fmm_cell) + lists + 4 * FMM_LISTS * sizeof(size_t);
+  size_t levels = 2;
+  for (size_t left = of_tree / leaf; left > 1; left /= 4) levels++;
+  bytes = plus(bytes, times(cells, each));
+  bytes = plus(bytes, times(operator_doubles(kernel, orders, full, levels), sizeof(double)));
+  return plus(bytes, (size_t)FMM_GROUP * (6 * full + 96 * stride) * sizeof(double));
 }
