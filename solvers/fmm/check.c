@@ -24,10 +24,11 @@ static batten_status check_options(batten_context *ctx, const batten_radial *ker
     return batten_fail(ctx, BATTEN_E_INVALID, "opt.accuracy: %g; must be 1e-12 .. 1e-3", opt->accuracy);
   const batten_fmm *share = opt->share;
   if (share && (share->kernel.n != kernel->n || share->kernel.power != kernel->power))
-    return batten_fail(ctx, BATTEN_E_INVALID,
-                       "opt.share: a plan of power %d in %u dimensions, this one has power %d in %u; share plans of the "
-                       "same kernel only",
-                       share->kernel.power, share->kernel.n, kernel->power, kernel->n);
+    return batten_fail(
+        ctx, BATTEN_E_INVALID,
+        "opt.share: a plan of power %d in %u dimensions, this one has power %d in %u; share plans of the "
+        "same kernel only",
+        share->kernel.power, share->kernel.n, kernel->power, kernel->n);
   if (share && share->accuracy != opt->accuracy)
     return batten_fail(ctx, BATTEN_E_INVALID, "opt.share: a plan of accuracy %g, this one has %g; share equal ones",
                        share->accuracy, opt->accuracy);
@@ -46,8 +47,9 @@ static batten_status check_points(batten_context *ctx, const char *name, unsigne
   if (count && !points) return batten_fail(ctx, BATTEN_E_INVALID, "%s: NULL with %zu points", name, count);
   for (size_t i = 0; i < count * n; i++)
     if (!(fabs(points[i]) < COORDINATE_MAX))
-      return batten_fail(ctx, BATTEN_E_INVALID, "%s[%zu][%zu]: %g; must be finite and below %g in size, drop the point",
-                         name, i / n, i % n, points[i], COORDINATE_MAX);
+      return batten_fail(ctx, BATTEN_E_INVALID,
+                         "%s[%zu][%zu]: %g; must be finite and below %g in size, drop the point", name, i / n, i % n,
+                         points[i], COORDINATE_MAX);
   return BATTEN_OK;
 }
 

@@ -36,8 +36,8 @@ static void direct_task(void *arg, size_t index) {
 static const size_t TERMS_PROGRESS = 64000000;
 
 /* Weights and dipoles as the inner loops read them, then the sums. */
-batten_status batten_fmm_direct(batten_context *ctx, const batten_fmm *f, const double *weights, const double *dipoles,
-                                bool gradients, size_t count, const size_t *at, double *sums) {
+batten_status batten_fmm_direct(batten_context *ctx, const batten_fmm *f, const double *weights,
+                                const double *dipoles, bool gradients, size_t count, const size_t *at, double *sums) {
   const size_t sources = f->sources.count, n = f->kernel.n;
   direct_sums d = {.fmm = f, .count = count, .at = at, .sums = sums};
   batten_status st = BATTEN_OK;
@@ -109,7 +109,8 @@ batten_status batten_fmm_error(batten_context *ctx, const batten_fmm *fmm, const
   st = batten_fmm_direct(ctx, fmm, weights, dipoles, gradients != NULL, count, at, sums);
   if (st < 0) goto done;
   if (value_error) *value_error = relative_error(count, at, sums, 0, 1, values, 1);
-  if (gradient_error) *gradient_error = relative_error(count, at, sums, 1, 1 + fmm->kernel.n, gradients, fmm->kernel.n);
+  if (gradient_error)
+    *gradient_error = relative_error(count, at, sums, 1, 1 + fmm->kernel.n, gradients, fmm->kernel.n);
 done:
   batten_free(ctx, sums);
   batten_free(ctx, at);

@@ -23,7 +23,8 @@ static size_t leaf_points(unsigned n, unsigned order) {
 /* Whether terms summed directly cost less than what is left of them and the far fields. In units of a term of near.c
  * (0.4 ns): an operation of a small product costs a fortieth of it, those of polynomials an eighth. */
 static bool is_direct_cheaper(const batten_fmm *f, fmm_orders orders) {
-  const double order = orders.order, n = f->kernel.n, full = pow(order, n), rank = (double)batten_fmm_rank_guess(f->kernel.n, orders.order);
+  const double order = orders.order, n = f->kernel.n, full = pow(order, n),
+               rank = (double)batten_fmm_rank_guess(f->kernel.n, orders.order);
   const double translations = (double)f->lists.kind_begin[f->lists.chunks * FMM_KINDS];
   const double points = (double)f->tree.sources.count + (double)f->tree.targets.count;
   const double fast = (double)f->lists.pairs + (double)f->lists.node_terms + translations * 2 * rank * rank / 40 +
@@ -53,8 +54,8 @@ static batten_status plan_tree(batten_context *ctx, batten_fmm *f, fmm_orders or
                        f->sources.count, f->targets.count);
   size_t full = 1;
   for (unsigned a = 0; a < n; a++) full *= orders.order;
-  batten_status st = batten_fmm_tree_new(ctx, n, &f->sources, &f->targets, f->same, leaf_points(n, orders.order),
-                                         &f->tree);
+  batten_status st =
+      batten_fmm_tree_new(ctx, n, &f->sources, &f->targets, f->same, leaf_points(n, orders.order), &f->tree);
   if (st < 0) return st;
   if ((st = batten_fmm_lists_new(ctx, n, full, &f->tree, &f->lists)) < 0) return st;
   if (!is_direct_cheaper(f, orders)) return BATTEN_OK;
@@ -208,26 +209,29 @@ static size_t operator_doubles(const batten_radial *kernel, fmm_orders orders, s
   const size_t n = kernel->n, kinds = n == 2 ? 12 : 56, half = (orders.order + 1) / 2;
   const size_t rank = batten_fmm_rank_guess(kernel->n, orders.order), stride = rank + FMM_PANEL;
   const size_t transfers = kinds * stride * rank, samples = (6 * (n == 2 ? half * half : half * half * half) + kinds);
-  const size_t sampling = samples * (kernel->logarithm ? 2 : 1) * 3 * full, making = 2 * stride * full + 8 * 90 * full;
+  const size_t sampling = samples * (kernel->logarithm ? 2 : 1) * 3 * full,
+               making = 2 * stride * full + 8 * 90 * full;
   return transfers * (kernel->logarithm ? 2 + levels : 1) + (sampling > making ? sampling : making);
 }
 
 size_t batten_fmm_bytes(const batten_radial *kernel, size_t source_count, size_t target_count,
                         const batten_fmm_options *opt) {
   const batten_fmm_options o = opt ? *opt : batten_fmm_options_default();
-  const size_t n = kernel->n, leaf_split = n == 2 ? 6 : 10; /* 2^n / (1 - 2^-n): cells for leaves that are 2^-n full */
+  const size_t n = kernel->n,
+               leaf_split = n == 2 ? 6 : 10; /* 2^n / (1 - 2^-n): cells for leaves that are 2^-n full */
   const size_t points = plus(source_count, target_count);
   /* Copies in the caller's order and in that of the tree, places, records with their spare, terms and sums. */
   size_t bytes = plus(sizeof(batten_fmm), times(points, 2 * n * sizeof(double) + 4 + 64 + 5 * sizeof(double)));
   if ((double)source_count * (double)target_count <= DIRECT_TERMS) return bytes;
   const fmm_orders orders = batten_fmm_orders(kernel, o.accuracy, o.gradients || o.dipoles);
-  const size_t leaf = leaf_points(kernel->n, orders.order), full = n == 2 ? orders.order * orders.order
-                                                                         : orders.order * orders.order * orders.order;
+  const size_t leaf = leaf_points(kernel->n, orders.order),
+               full = n == 2 ? orders.order * orders.order : orders.order * orders.order * orders.order;
   const size_t stride = batten_fmm_rank_guess(kernel->n, orders.order) + FMM_PANEL;
   const size_t of_tree = source_count == target_count ? source_count : points; /* one cloud as a rule, or two */
   const size_t cells = plus(times(of_tree / leaf, leaf_split), 64);
   const size_t lists = n == 2 ? 27 * sizeof(fmm_translation) + 9 * 4 : 189 * sizeof(fmm_translation) + 27 * 4;
-  const size_t each = (full + 2 * stride) * sizeof(double) + sizeof(fmm_cell) + lists + 4 * FMM_LISTS * sizeof(size_t);
+  const size_t each =
+      (full + 2 * stride) * sizeof(double) + sizeof(fmm_cell) + lists + 4 * FMM_LISTS * sizeof(size_t);
   size_t levels = 2;
   for (size_t left = of_tree / leaf; left > 1; left /= 4) levels++;
   bytes = plus(bytes, times(cells, each));

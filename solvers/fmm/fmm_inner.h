@@ -36,17 +36,17 @@ typedef struct fmm_operators {
   atomic_size_t owners;
   batten_context *ctx;
   unsigned n, order;
-  size_t full;                                     /* order^n */
-  size_t rank, stride;                             /* stride: rank, up to whole panels */
-  unsigned classes;                                /* 2^n */
+  size_t full;         /* order^n */
+  size_t rank, stride; /* stride: rank, up to whole panels */
+  unsigned classes;    /* 2^n */
   size_t class_full[FMM_CLASSES], class_rank[FMM_CLASSES];
-  size_t class_place[FMM_CLASSES];                 /* where a class begins among the `rank` numbers */
-  uint32_t *members;                               /* [full] entries of a tensor, class by class */
-  double *reduce[FMM_CLASSES];                     /* [class_full][class_rank] basis of a class */
-  double *expand[FMM_CLASSES];                     /* [class_rank][class_full] its transpose */
-  double *transfer[FMM_KINDS];                     /* panels [stride / FMM_PANEL][rank][FMM_PANEL]; NULL: no such kind */
-  double *transfer_power[FMM_KINDS];               /* the same of r^power where the kernel has a logarithm */
-  double node[FMM_ORDER_MAX];                      /* Chebyshev nodes */
+  size_t class_place[FMM_CLASSES];   /* where a class begins among the `rank` numbers */
+  uint32_t *members;                 /* [full] entries of a tensor, class by class */
+  double *reduce[FMM_CLASSES];       /* [class_full][class_rank] basis of a class */
+  double *expand[FMM_CLASSES];       /* [class_rank][class_full] its transpose */
+  double *transfer[FMM_KINDS];       /* panels [stride / FMM_PANEL][rank][FMM_PANEL]; NULL: no such kind */
+  double *transfer_power[FMM_KINDS]; /* the same of r^power where the kernel has a logarithm */
+  double node[FMM_ORDER_MAX];        /* Chebyshev nodes */
   double at_nodes[FMM_ORDER_MAX][FMM_ORDER_MAX];   /* [a][k] tau_a(node_k) */
   double from_nodes[FMM_ORDER_MAX][FMM_ORDER_MAX]; /* its transpose */
   double up[2][FMM_ORDER_MAX][FMM_ORDER_MAX];      /* [side][a][i]: moments of a child to those of its parent */
@@ -83,8 +83,8 @@ typedef struct fmm_tree {
   unsigned levels;
   fmm_cell *cell; /* level by level, the children of a cell together */
   size_t level_first[FMM_LEVELS_MAX + 1];
-  fmm_points sources, targets;         /* in the order of the tree, points that no cell can part as one; x of targets */
-  bool same;                           /* targets are the sources: targets has no block of its own */
+  fmm_points sources, targets; /* in the order of the tree, points that no cell can part as one; x of targets */
+  bool same;                   /* targets are the sources: targets has no block of its own */
   uint32_t *source_place, *target_place; /* where a point of the caller is; the same array when `same` */
 } fmm_tree;
 
@@ -162,8 +162,8 @@ batten_status batten_fmm_passes(batten_context *ctx, batten_fmm *f, const double
 /* ---- direct.c ---- */
 
 /* sums [FMM_SUMS][count]: over all sources at `count` targets, which ones `at` says (NULL: 0 .. count - 1). */
-batten_status batten_fmm_direct(batten_context *ctx, const batten_fmm *f, const double *weights, const double *dipoles,
-                                bool gradients, size_t count, const size_t *at, double *sums);
+batten_status batten_fmm_direct(batten_context *ctx, const batten_fmm *f, const double *weights,
+                                const double *dipoles, bool gradients, size_t count, const size_t *at, double *sums);
 
 /* ---- check.c ---- */
 

@@ -1,5 +1,5 @@
-/* The inner loops of fast multipole sums, once per instruction set; batten_fmm_lanes_now() gives the widest that the processor
- * has.
+/* The inner loops of fast multipole sums, once per instruction set; batten_fmm_lanes_now() gives the widest that the
+ * processor has.
  *
  * Every number is made by the same IEEE operations in the same order in each set, and no product is contracted with a
  * sum: the choice changes the time and no bit. */
@@ -43,14 +43,14 @@ typedef struct fmm_lanes {
   fmm_fill_function *(*fill)(unsigned n, unsigned power);
   /* y[c][i] = sum_k panel[k][i] b[c][k], i < FMM_PANEL, c < FMM_COLUMNS, k < depth */
   void (*tile)(size_t depth, const double *panel, const double *b, size_t ldb, double *y, size_t ldy);
-  /* out[q][i] = sum_a matrix[a][i] in[a][q], a and i < order, q < rest: one axis of a tensor goes through a matrix and
-   * from the first place to the last */
+  /* out[q][i] = sum_a matrix[a][i] in[a][q], a and i < order, q < rest: one axis of a tensor goes through a matrix
+   * and from the first place to the last */
   void (*contract)(unsigned order, size_t rest, const double (*matrix)[FMM_ORDER_MAX], const double *in, double *out);
   /* out[i] += sum_j rows[j][i] x[j], i < length, j < count */
   void (*combine)(size_t count, size_t length, const double *rows, const double *x, double *out);
   /* moments += those of the terms first .. last - 1; scratch has 8 order^(n-1) numbers */
-  void (*moments)(unsigned n, unsigned order, const fmm_frame *frame, int dipoles, const fmm_terms *terms, size_t first,
-                  size_t last, double *moments, double *scratch);
+  void (*moments)(unsigned n, unsigned order, const fmm_frame *frame, int dipoles, const fmm_terms *terms,
+                  size_t first, size_t last, double *moments, double *scratch);
   /* sums += the expansion `local` at FMM_LANES points, with its derivatives if wanted */
   void (*evaluate)(unsigned n, unsigned order, const fmm_frame *frame, int gradients, const double *local,
                    const double x[3][FMM_LANES], double sums[FMM_SUMS][FMM_LANES]);

@@ -1,11 +1,15 @@
 /* Which cells meet, by one walk over pairs of cells from the pair of roots.
  *
- *   side by side, both leaves          direct sums
- *   same level, apart                  a translation between far fields; the parents are side by side, so the offset is
- *                                      in {-3 .. 3}^n, and one axis has 2 or more
- *   a leaf and a smaller cell, apart   the far field of the smaller one at its nodes: evaluated at the targets of the
- *                                      leaf, or made from its sources; direct sums where those are fewer
- *   else                               the larger one is cut (both, when they are of one level)
+ *   side by side, both leaves:         direct sums
+ *
+ *   same level, apart:                 a translation between far fields; the parents are side by side, so the
+ *                                      offset is in {-3 .. 3}^n, and one axis has 2 or more
+ *
+ *   a leaf and a smaller cell, apart:  the far field of the smaller one at its nodes, evaluated at the targets of
+ *                                      the leaf or made from its sources; direct sums where those are fewer
+ *
+ *   else:                              the larger one is cut (both, when they are of one level)
+ *
  * The walk is made twice, to count and to fill; each list is in the order of the walk. */
 #include "fmm/fmm_inner.h"
 

@@ -1,7 +1,7 @@
 /* Direct sums, and panels of the matrix phi(|x - y|), for one instruction set (see lanes.h).
  *
- * FMM_LANES targets go side by side through the loop over the sources: the compiler turns each loop over the lanes into
- * a few vector instructions and keeps the sums in registers. Each kernel, dimension and kind of term has its own
+ * FMM_LANES targets go side by side through the loop over the sources: the compiler turns each loop over the lanes
+ * into a few vector instructions and keeps the sums in registers. Each kernel, dimension and kind of term has its own
  * function, made from one inline body by constants. */
 #include "fmm/lanes.h"
 
@@ -15,8 +15,8 @@
 #endif
 
 /* (n, power) that exist; even powers have the logarithm. */
-#define KERNELS(X) X(2, 1) X(2, 2) X(2, 3) X(2, 4) X(2, 5) X(2, 6) X(2, 7) \
-                   X(3, 1) X(3, 2) X(3, 3) X(3, 4) X(3, 5) X(3, 6) X(3, 7)
+#define KERNELS(X) \
+  X(2, 1) X(2, 2) X(2, 3) X(2, 4) X(2, 5) X(2, 6) X(2, 7) X(3, 1) X(3, 2) X(3, 3) X(3, 4) X(3, 5) X(3, 6) X(3, 7)
 
 /* Sources whose terms are added up before they join the total: rounding errors grow with CHUNK + N / CHUNK, not N. */
 enum { CHUNK = 64 };
@@ -52,11 +52,11 @@ BATTEN_ALWAYS_INLINE void add_sources(unsigned n, unsigned power, bool gradients
   }
 }
 
-#define FUNCTION(n, power, gradients, dipoles)                                                              \
-  static void near_##n##_##power##_##gradients##_##dipoles(const fmm_terms *s, size_t first, size_t last,   \
-                                                           const double x[3][FMM_LANES],                    \
-                                                           double sums[FMM_SUMS][FMM_LANES]) {              \
-    add_sources(n, power, gradients, dipoles, s, first, last, x, sums);                                     \
+#define FUNCTION(n, power, gradients, dipoles)                                                            \
+  static void near_##n##_##power##_##gradients##_##dipoles(const fmm_terms *s, size_t first, size_t last, \
+                                                           const double x[3][FMM_LANES],                  \
+                                                           double sums[FMM_SUMS][FMM_LANES]) {            \
+    add_sources(n, power, gradients, dipoles, s, first, last, x, sums);                                   \
   }
 #define FUNCTIONS(n, power) \
   FUNCTION(n, power, 0, 0) FUNCTION(n, power, 0, 1) FUNCTION(n, power, 1, 0) FUNCTION(n, power, 1, 1)
@@ -64,7 +64,7 @@ KERNELS(FUNCTIONS)
 
 fmm_near_function *FMM_OF_SET(batten_fmm_near)(unsigned n, unsigned power, int gradients, int dipoles) {
   static fmm_near_function *const functions[4][8][2][2] = {
-#define ROW(n, power)                                                  \
+#define ROW(n, power)                                                 \
   [n][power] = {{near_##n##_##power##_0_0, near_##n##_##power##_0_1}, \
                 {near_##n##_##power##_1_0, near_##n##_##power##_1_1}},
       KERNELS(ROW)};
@@ -84,10 +84,10 @@ BATTEN_ALWAYS_INLINE void fill(unsigned n, unsigned power, const double rows[3][
   }
 }
 
-#define FILL_FUNCTION(n, power)                                                                                  \
-  static void fill_##n##_##power(const double rows[3][FMM_PANEL], size_t count, const double *const columns[3],  \
-                                 double *panel) {                                                                \
-    fill(n, power, rows, count, columns, panel);                                                                 \
+#define FILL_FUNCTION(n, power)                                                                                 \
+  static void fill_##n##_##power(const double rows[3][FMM_PANEL], size_t count, const double *const columns[3], \
+                                 double *panel) {                                                               \
+    fill(n, power, rows, count, columns, panel);                                                                \
   }
 KERNELS(FILL_FUNCTION)
 

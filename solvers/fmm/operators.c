@@ -2,17 +2,18 @@
  *
  * In a cell of side 2 about 0 the kernel is interpolated at the order^n Chebyshev nodes:
  *   phi(|x - y + 2 t|) = sum tau_i(x) K_t[i][j] tau_j(y),   tau_0 = sqrt(1/order), tau_a = sqrt(2/order) T_a
- * (the discrete orthogonality of T_a at the nodes makes tau orthonormal there), i and j standing for a product over the
- * axes. One orthonormal basis U serves all offsets t that two cells of one level can meet at: the left singular vectors,
- * up to the cut, of sampled columns of all K_t; since K_-t is the transpose, U serves sources and targets alike.
- * C_t = U' K_t U is what remains.
+ * (the discrete orthogonality of T_a at the nodes makes tau orthonormal there), i and j standing for a product over
+ * the axes. One orthonormal basis U serves all offsets t that two cells of one level can meet at: the left singular
+ * vectors, up to the cut, of sampled columns of all K_t; since K_-t is the transpose, U serves sources and targets
+ * alike. C_t = U' K_t U is what remains.
  *
- * Mirrors: x_a -> -x_a multiplies tau_i by the parity of i along axis a. The sampled space is the same under all mirrors,
- * so U splits into the 2^n classes of parity: singular vectors of 2^n matrices of a 2^n-th of the size, and offsets of
- * other signs have the same C_t up to the signs of rows and columns: 56 operators in 3-D in place of 316.
+ * Mirrors: x_a -> -x_a multiplies tau_i by the parity of i along axis a. The sampled space is the same under all
+ * mirrors, so U splits into the 2^n classes of parity: singular vectors of 2^n matrices of a 2^n-th of the size, and
+ * offsets of other signs have the same C_t up to the signs of rows and columns: 56 operators in 3-D in place of 316.
  *
- * Scale: phi(h r) = h^p phi(r). With the logarithm phi(h r) = h^p (phi(r) + ln h r^p): each level has C_t + ln h D_t, D_t
- * being made of r^p as C_t is of phi. r^p is a polynomial here and no more than a few columns in the sampled space. */
+ * Scale: phi(h r) = h^p phi(r). With the logarithm phi(h r) = h^p (phi(r) + ln h r^p): each level has C_t + ln h D_t,
+ * D_t being made of r^p as C_t is of phi. r^p is a polynomial here and no more than a few columns in the sampled
+ * space. */
 #include "fmm/fmm_inner.h"
 
 #include "base/checked.h"
@@ -22,10 +23,10 @@
 
 /* ---- sizes ---- */
 
-/* The 2-norm of the error is some 20 to 60 cuts for r in space, more for kernels that grow faster and where derivatives
- * come in; order = -log10 cut is then enough for the interpolation. */
+/* The 2-norm of the error is some 20 to 60 cuts for r in space, more for kernels that grow faster and where
+ * derivatives come in; order = -log10 cut is then enough for the interpolation. */
 fmm_orders batten_fmm_orders(const batten_radial *kernel, double accuracy, bool derivatives) {
-  const double cut = accuracy / (derivatives || kernel->n == 2 ? 250 : 80);
+  const double cut = accuracy / (derivatives || kernel->n == 2 ? 400 : 80);
   unsigned order = (unsigned)ceil(-log10(cut) - 0.2) + (derivatives ? 1 : 0);
   if (order > FMM_ORDER_MAX) order = FMM_ORDER_MAX;
   return (fmm_orders){order < 4 ? 4 : order, cut};
@@ -129,14 +130,14 @@ typedef struct sampler {
   const fmm_lanes *lanes;
   unsigned power;
   bool logarithm;
-  double *grid[3];   /* [full] the nodes */
+  double *grid[3]; /* [full] the nodes */
   size_t kinds;
   unsigned kind[FMM_KINDS];
   size_t per_kind, columns;
-  double *samples;   /* [columns][full], entries by class */
+  double *samples;                 /* [columns][full], entries by class */
   double *class_work[FMM_CLASSES]; /* [class_full^2] triangle of a class */
-  double *singular;  /* [full] by class */
-  double *scratch;   /* [columns][2 * full] */
+  double *singular;                /* [full] by class */
+  double *scratch;                 /* [columns][2 * full] */
 } sampler;
 
 /* A tensor over the nodes to one over the polynomials (or the reverse, by the matrix); ends in `in`. */
@@ -206,8 +207,9 @@ static void triangle(const qp_lanes *lanes, size_t rows, size_t m, double *x, do
   }
 }
 
-/* One-sided Jacobi: rotates the columns of r [m][m] until they are orthogonal: they are singular vectors times singular
- * values then. Accurate to each column's own size, so that cuts of 1e-14 are safe.   [Demmel, Veselic 1992] */
+/* One-sided Jacobi: rotates the columns of r [m][m] until they are orthogonal: they are singular vectors times
+ * singular values then. Accurate to each column's own size, so that cuts of 1e-14 are safe.   [Demmel, Veselic 1992]
+ */
 static void jacobi(const qp_lanes *lanes, size_t m, double *r, double *squares) {
   for (unsigned sweep = 0; sweep < 30; sweep++) {
     bool quiet = true;
@@ -320,9 +322,9 @@ enum { COLUMN_BLOCK = 64 };
 typedef struct transfers {
   const sampler *s;
   fmm_fill_function *fill;
-  double *columns;  /* [rank up to FMM_COLUMNS][full] the basis at the nodes */
-  double *panels;   /* [stride / FMM_PANEL][full][FMM_PANEL] the same as panels */
-  double *scratch;  /* for each task */
+  double *columns; /* [rank up to FMM_COLUMNS][full] the basis at the nodes */
+  double *panels;  /* [stride / FMM_PANEL][full][FMM_PANEL] the same as panels */
+  double *scratch; /* for each task */
   size_t scratch_each, first;
   bool of_power;
 } transfers;
@@ -456,7 +458,8 @@ void batten_fmm_operators_free(fmm_operators *o) {
 batten_status batten_fmm_operators_new(batten_context *ctx, const batten_radial *kernel, fmm_orders orders,
                                        fmm_operators **out) {
   const size_t before = batten_bytes_in_use(ctx);
-  sampler s = {.lanes = batten_fmm_lanes_now(), .power = (unsigned)kernel->power, .logarithm = kernel->logarithm != 0};
+  sampler s = {
+      .lanes = batten_fmm_lanes_now(), .power = (unsigned)kernel->power, .logarithm = kernel->logarithm != 0};
   s.near = s.lanes->near(kernel->n, s.power, 0, 0);
   batten_status st = BATTEN_E_NOMEM;
   fmm_operators *o = batten_alloc(ctx, sizeof *o);

@@ -6,8 +6,8 @@
  *   inner      sums of C_t outer over the translations to a cell
  *   down       expansion of a cell: its parent's, U inner, and sources of larger leaves; evaluated in the leaves
  *
- * Every number is made by one task, in an order that sizes alone decide. Tensors hold moments first and expansions then:
- * the far fields that `near` evaluates at nodes are the last to be read. */
+ * Every number is made by one task, in an order that sizes alone decide. Tensors hold moments first and expansions
+ * then: the far fields that `near` evaluates at nodes are the last to be read. */
 #include "fmm/fmm_inner.h"
 
 #include "base/checked.h"
@@ -42,8 +42,9 @@ static void compress(const pass *p, size_t cell, double *spare) {
 }
 
 /* Moves a tensor between a child and its parent: one axis after the other, by the side on which the child lies. */
-static const double *shift(const pass *p, const fmm_cell *child, const double (*matrices)[FMM_ORDER_MAX][FMM_ORDER_MAX],
-                           const double *tensor, double *a, double *b) {
+static const double *shift(const pass *p, const fmm_cell *child,
+                           const double (*matrices)[FMM_ORDER_MAX][FMM_ORDER_MAX], const double *tensor, double *a,
+                           double *b) {
   const fmm_operators *o = p->f->operators;
   const fmm_cell *parent = &p->f->tree.cell[child->parent];
   for (unsigned k = 0; k < o->n; k++) {
@@ -101,8 +102,8 @@ static void place_nodes(const fmm_operators *o, const fmm_frame *frame, double *
 }
 
 /* Sums at the targets of a leaf over a range of terms. */
-static void sum_at_leaf(const pass *p, const fmm_cell *c, fmm_near_function *near, const fmm_terms *terms, size_t first,
-                        size_t last) {
+static void sum_at_leaf(const pass *p, const fmm_cell *c, fmm_near_function *near, const fmm_terms *terms,
+                        size_t first, size_t last) {
   const fmm_points *targets = &p->f->tree.targets;
   double *sums = p->f->work.sums;
   const unsigned n = p->f->kernel.n, used = p->gradients ? 1 + n : 1;
@@ -118,7 +119,8 @@ static void sum_at_leaf(const pass *p, const fmm_cell *c, fmm_near_function *nea
 }
 
 /* The far field of a cell as weights at its nodes. */
-static void sum_far_cell(const pass *p, const fmm_cell *leaf, size_t source, fmm_near_function *near, double *scratch) {
+static void sum_far_cell(const pass *p, const fmm_cell *leaf, size_t source, fmm_near_function *near,
+                         double *scratch) {
   const fmm_operators *o = p->f->operators;
   double *x[3] = {scratch, scratch + o->full, scratch + 2 * o->full}, *a = scratch + 3 * o->full, *b = a + o->full;
   place_nodes(o, &p->f->tree.cell[source].frame, x);
@@ -200,17 +202,19 @@ static void across_task(void *arg, size_t index) {
     const double *transfer = level ? level + known * o->stride * o->rank : o->transfer[kind];
     known++;
     for (size_t i = begin[kind]; i < begin[kind + 1]; i += BATCH)
-      translate(p, transfer, l->translations + i, begin[kind + 1] - i < BATCH ? begin[kind + 1] - i : BATCH, factor, b,
-                y);
+      translate(p, transfer, l->translations + i, begin[kind + 1] - i < BATCH ? begin[kind + 1] - i : BATCH, factor,
+                b, y);
   }
 }
 
 /* ---- down ---- */
 
 /* Adds the sources of a larger leaf to an expansion, by their sums at the nodes. */
-static void add_leaf_sources(const pass *p, const fmm_cell *c, const fmm_cell *leaf, double *tensor, double *scratch) {
+static void add_leaf_sources(const pass *p, const fmm_cell *c, const fmm_cell *leaf, double *tensor,
+                             double *scratch) {
   const fmm_operators *o = p->f->operators;
-  double *nodes[3] = {scratch, scratch + o->full, scratch + 2 * o->full}, *a = scratch + 3 * o->full, *b = a + o->full;
+  double *nodes[3] = {scratch, scratch + o->full, scratch + 2 * o->full}, *a = scratch + 3 * o->full,
+         *b = a + o->full;
   fmm_near_function *near = p->lanes->near(o->n, (unsigned)p->f->kernel.power, 0, p->dipoles);
   place_nodes(o, &c->frame, nodes);
   for (size_t i = 0; i < o->full; i += FMM_LANES) {
@@ -286,7 +290,8 @@ static batten_status run(batten_context *ctx, pass *p, size_t tasks, void (*task
   return BATTEN_OK;
 }
 
-static batten_status run_level(batten_context *ctx, pass *p, unsigned level, void (*task)(void *, size_t), double at) {
+static batten_status run_level(batten_context *ctx, pass *p, unsigned level, void (*task)(void *, size_t),
+                               double at) {
   p->first = p->f->tree.level_first[level], p->last = p->f->tree.level_first[level + 1];
   return run(ctx, p, (p->last - p->first + CELLS_TOGETHER - 1) / CELLS_TOGETHER, task, at, at);
 }

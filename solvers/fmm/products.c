@@ -1,5 +1,5 @@
-/* Small dense products, and polynomials at many points, for one instruction set (see lanes.h). BLAS would start threads
- * of its own inside of ours, and its bits depend on its make. */
+/* Small dense products, and polynomials at many points, for one instruction set (see lanes.h). BLAS would start
+ * threads of its own inside of ours, and its bits depend on its make. */
 #include "fmm/lanes.h"
 
 #include <math.h>
@@ -34,7 +34,7 @@ static inline void part(size_t depth, const double *panel, const double *b, size
 #define CLEAR(c) VECTORS(CLEAR_ONE, c)
 #define LOAD(c, v) const eight a##v = *(const eight *)(panel + 8 * v);
 #define ADD_ONE(c, v) s##c##v += a##v * factor##c;
-#define ADD(c)                            \
+#define ADD(c)                             \
   const double factor##c = b[c * ldb + k]; \
   VECTORS(ADD_ONE, c)
 #define STORE_ONE(c, v) *(eight *)(y + c * ldy + 8 * v) = s##c##v;
@@ -107,8 +107,8 @@ static void add_side(size_t order, size_t rest, const double a[FMM_ORDER_MAX][FM
   }
 }
 
-/* w . g: the part of the terms that goes with tau(x) and that which goes with its derivative, for each source a row of
- * the other axes' products. u and g are the weight and the dipole in units of the cell. */
+/* w . g: the part of the terms that goes with tau(x) and that which goes with its derivative, for each source a row
+ * of the other axes' products. u and g are the weight and the dipole in units of the cell. */
 static void side_rows(unsigned n, size_t order, unsigned lane, double u, const double g[3],
                       double value[3][FMM_ORDER_MAX][FMM_LANES], double slope[3][FMM_ORDER_MAX][FMM_LANES],
                       double *plain, double *along) {
@@ -144,7 +144,8 @@ static void moments(unsigned n, unsigned order, const fmm_frame *frame, int dipo
         const size_t j = j0 + lane + s;
         double g[3] = {0, 0, 0};
         for (unsigned a = 0; a < n && dipoles && j < last; a++) g[a] = terms->g[a][j] / frame->half;
-        side_rows(n, order, lane + s, j < last ? terms->w[j] : 0, g, value, slope, plain + s * rest, along + s * rest);
+        side_rows(n, order, lane + s, j < last ? terms->w[j] : 0, g, value, slope, plain + s * rest,
+                  along + s * rest);
       }
       add_side(order, rest, (const double(*)[FMM_LANES])value[0], lane, plain, out);
       if (dipoles) add_side(order, rest, (const double(*)[FMM_LANES])slope[0], lane, along, out);
@@ -153,9 +154,8 @@ static void moments(unsigned n, unsigned order, const fmm_frame *frame, int dipo
 }
 
 /* row[q][lane] += sums over the last axis: of tau, and of its derivative. */
-static inline void last_axis(size_t order, int gradients, const double *local,
-                             double value[FMM_ORDER_MAX][FMM_LANES], double slope[FMM_ORDER_MAX][FMM_LANES],
-                             double row[2][FMM_LANES]) {
+static inline void last_axis(size_t order, int gradients, const double *local, double value[FMM_ORDER_MAX][FMM_LANES],
+                             double slope[FMM_ORDER_MAX][FMM_LANES], double row[2][FMM_LANES]) {
   double v[FMM_LANES] = {0}, d[FMM_LANES] = {0};
   for (size_t c = 0; c < order; c++) LANES_LOOP(unsigned i = 0; i < FMM_LANES; i++) v[i] += local[c] * value[c][i];
   if (gradients)

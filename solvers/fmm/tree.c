@@ -1,10 +1,10 @@
 /* The tree of cells: an octree, in the plane a quadtree, of sources and targets together.
  *
- * A cell with more than leaf_points sources or targets is cut at its centre as long as there is anything to part. Sides
- * are powers of two and centres are whole numbers of them, so that places within a cell, and offsets between cells, are
- * exact however small the cell is: there are no integer keys that would bound the depth. It ends where doubles cannot
- * tell the centres of children apart, or all points of a cell are equal; those become one point with the sum of the
- * weights, since terms at r = 0 are 0. */
+ * A cell with more than leaf_points sources or targets is cut at its centre as long as there is anything to part.
+ * Sides are powers of two and centres are whole numbers of them, so that places within a cell, and offsets between
+ * cells, are exact however small the cell is: there are no integer keys that would bound the depth. It ends where
+ * doubles cannot tell the centres of children apart, or all points of a cell are equal; those become one point with
+ * the sum of the weights, since terms at r = 0 are 0. */
 #include "fmm/fmm_inner.h"
 
 #include "base/checked.h"
@@ -57,8 +57,8 @@ static unsigned octant(unsigned n, const fmm_frame *frame, const double *x) {
 }
 
 /* Sorts records first .. last - 1 by octant, stably; begin[o] .. begin[o + 1] is octant o then. */
-static void part_records(unsigned n, const fmm_frame *frame, record *records, record *spare, size_t first, size_t last,
-                         size_t begin[FMM_CLASSES + 1]) {
+static void part_records(unsigned n, const fmm_frame *frame, record *records, record *spare, size_t first,
+                         size_t last, size_t begin[FMM_CLASSES + 1]) {
   size_t next[FMM_CLASSES] = {0}, at = first;
   for (size_t i = first; i < last; i++) next[octant(n, frame, records[i].x)]++;
   for (unsigned o = 0; o < FMM_CLASSES; o++) {
@@ -129,7 +129,10 @@ static void add_children(builder *b, size_t index) {
     *k = (fmm_cell){.frame.half = c->frame.half / 2,
                     .parent = (uint32_t)index,
                     .level = c->level + 1,
-                    .s0 = s[o], .s1 = s[o + 1], .t0 = u[o], .t1 = u[o + 1]};
+                    .s0 = s[o],
+                    .s1 = s[o + 1],
+                    .t0 = u[o],
+                    .t1 = u[o + 1]};
     for (unsigned a = 0; a < b->n; a++)
       k->frame.centre[a] = c->frame.centre[a] + ((o >> a & 1) ? k->frame.half : -k->frame.half);
     c->children++;

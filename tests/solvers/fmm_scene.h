@@ -9,26 +9,27 @@
 typedef struct fmm_scene {
   unsigned n;
   size_t sources, targets;
-  double *y, *x;        /* [sources][n], [targets][n] */
-  double *w, *g;        /* [sources], [sources][n] */
-  double *u, *du;       /* [targets], [targets][n]: results */
+  double *y, *x;  /* [sources][n], [targets][n] */
+  double *w, *g;  /* [sources], [sources][n] */
+  double *u, *du; /* [targets], [targets][n]: results */
 } fmm_scene;
 
 typedef enum fmm_place {
   PLACE_VOLUME,
   PLACE_SURFACE,
-  PLACE_FAR_OFF,   /* coordinates of 7e6 */
-  PLACE_PLANE,     /* coplanar, in 2-D collinear, askew */
-  PLACE_LINE,      /* along an axis */
-  PLACE_DUPLICATES,/* each point twice, and a quarter of all at two places */
-  PLACE_CLUSTERS,  /* half of the points within 1e-10 of two places */
-  PLACE_OUTLIER,   /* one point 1e6 away */
-  PLACE_UNEVEN,    /* density 1 : 1000 */
-  PLACE_GRADED,    /* distances from the origin fall like 2^-k, k to 300 */
+  PLACE_FAR_OFF,    /* coordinates of 7e6 */
+  PLACE_PLANE,      /* coplanar, in 2-D collinear, askew */
+  PLACE_LINE,       /* along an axis */
+  PLACE_DUPLICATES, /* each point twice, and a quarter of all at two places */
+  PLACE_CLUSTERS,   /* half of the points within 1e-10 of two places */
+  PLACE_OUTLIER,    /* one point 1e6 away */
+  PLACE_UNEVEN,     /* density 1 : 1000 */
+  PLACE_GRADED,     /* distances from the origin fall like 2^-k, k to 300 */
   PLACES
 } fmm_place;
-static const char *const place_names[] = {"volume",     "surface",  "coordinates of 7e6", "plane",  "line",
-                                          "duplicates", "clusters", "outlier",            "uneven", "graded"};
+static const char *const place_names[] = {"volume", "surface",    "coordinates of 7e6", "plane",
+                                          "line",   "duplicates", "clusters",           "outlier",
+                                          "uneven", "graded"};
 
 static inline void place_point(fmm_place place, unsigned n, size_t i, uint64_t *seed, double *x) {
   double norm = 0;
@@ -36,16 +37,35 @@ static inline void place_point(fmm_place place, unsigned n, size_t i, uint64_t *
   norm = sqrt(norm);
   const double pick = t_uniform(seed);
   for (unsigned a = 0; a < n; a++) switch (place) {
-      case PLACE_SURFACE: x[a] /= norm; break;
-      case PLACE_FAR_OFF: x[a] = 7e6 + 500 * x[a]; break;
-      case PLACE_PLANE: x[a] = a + 1 == n ? 0.3 * x[0] - (n > 2 ? 0.7 * x[1] : 0) : x[a]; break;
-      case PLACE_LINE: x[a] = a == 0 ? x[a] : 0.25; break;
-      case PLACE_DUPLICATES: x[a] = pick < 0.25 ? (pick < 0.125 ? 0.5 : 0.5 + 1e-9) : x[a]; break;
-      case PLACE_CLUSTERS: x[a] = pick < 0.5 ? (pick < 0.25 ? 0.125 : -0.7) + 1e-10 * x[a] : x[a]; break;
-      case PLACE_OUTLIER: x[a] = i == 17 ? 1e6 : x[a]; break;
-      case PLACE_UNEVEN: x[a] = pick < 0.9 ? 0.1 * x[a] + 0.3 : x[a]; break;
-      case PLACE_GRADED: x[a] = ldexp(x[a] / norm, -(int)(300 * pick)); break;
-      default: break;
+      case PLACE_SURFACE:
+        x[a] /= norm;
+        break;
+      case PLACE_FAR_OFF:
+        x[a] = 7e6 + 500 * x[a];
+        break;
+      case PLACE_PLANE:
+        x[a] = a + 1 == n ? 0.3 * x[0] - (n > 2 ? 0.7 * x[1] : 0) : x[a];
+        break;
+      case PLACE_LINE:
+        x[a] = a == 0 ? x[a] : 0.25;
+        break;
+      case PLACE_DUPLICATES:
+        x[a] = pick < 0.25 ? (pick < 0.125 ? 0.5 : 0.5 + 1e-9) : x[a];
+        break;
+      case PLACE_CLUSTERS:
+        x[a] = pick < 0.5 ? (pick < 0.25 ? 0.125 : -0.7) + 1e-10 * x[a] : x[a];
+        break;
+      case PLACE_OUTLIER:
+        x[a] = i == 17 ? 1e6 : x[a];
+        break;
+      case PLACE_UNEVEN:
+        x[a] = pick < 0.9 ? 0.1 * x[a] + 0.3 : x[a];
+        break;
+      case PLACE_GRADED:
+        x[a] = ldexp(x[a] / norm, -(int)(300 * pick));
+        break;
+      default:
+        break;
     }
 }
 
@@ -79,9 +99,11 @@ static inline void scene_radial(const batten_radial *k, long double r, long doub
   f[0] = f[1] = f[2] = 0;
   if (r == 0) return;
   const long double l = k->logarithm ? logl(r) : 1, e = k->logarithm ? 1 : 0;
-  f[0] = powl(r, p) * l;
-  f[1] = powl(r, p - 2) * (p * l + e);
-  f[2] = powl(r, p - 4) * ((p - 2) * (p * l + e) + p * e);
+  long double power = 1;
+  for (int i = 0; i < k->power; i++) power *= r;
+  f[0] = power * l;
+  f[1] = power / (r * r) * (p * l + e);
+  f[2] = power / (r * r) / (r * r) * ((p - 2) * (p * l + e) + p * e);
 }
 
 /* Relative 2-norms of the errors of s->u and s->du at every step-th target. */

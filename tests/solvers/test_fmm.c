@@ -26,8 +26,8 @@ static void check(const batten_radial *k, size_t sources, size_t targets, double
   o.gradients = o.dipoles = derivatives;
   batten_fmm *f = NULL;
   char what[96];
-  snprintf(what, sizeof what, "r^%d%s in %u-D, %zu to %zu, %g%s", k->power, k->logarithm ? " ln r" : "", k->n, sources,
-           s.targets, accuracy, derivatives ? ", derivatives" : "");
+  snprintf(what, sizeof what, "r^%d%s in %u-D, %zu to %zu, %g%s", k->power, k->logarithm ? " ln r" : "", k->n,
+           sources, s.targets, accuracy, derivatives ? ", derivatives" : "");
   bool ok = batten_fmm_create(ctx, k, sources, s.y, targets ? targets : sources, targets ? s.x : NULL, &o, &f) >= 0 &&
             batten_fmm_apply(ctx, f, s.w, derivatives ? s.g : NULL, s.u, derivatives ? s.du : NULL) >= 0;
   if (!T_CHECK(ok, "%s %s", what, ok ? "" : batten_error(ctx))) return;
@@ -50,8 +50,9 @@ static void check(const batten_radial *k, size_t sources, size_t targets, double
 int main(void) {
   ctx = t_context(NULL, NULL, 2);
   test_by_hand();
-  static const batten_radial kernels[] = {{2, 1, 0}, {2, 2, 1}, {2, 3, 0}, {2, 4, 1}, {2, 5, 0}, {2, 6, 1}, {2, 7, 0},
-                                          {3, 1, 0}, {3, 2, 1}, {3, 3, 0}, {3, 4, 1}, {3, 5, 0}, {3, 6, 1}, {3, 7, 0}};
+  static const batten_radial kernels[] = {{2, 1, 0}, {2, 2, 1}, {2, 3, 0}, {2, 4, 1}, {2, 5, 0},
+                                          {2, 6, 1}, {2, 7, 0}, {3, 1, 0}, {3, 2, 1}, {3, 3, 0},
+                                          {3, 4, 1}, {3, 5, 0}, {3, 6, 1}, {3, 7, 0}};
   for (size_t i = 0; i < sizeof kernels / sizeof *kernels; i++) {
     const batten_radial *k = &kernels[i];
     check(k, 8000, 0, 1e-4, false);

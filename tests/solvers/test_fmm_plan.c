@@ -49,7 +49,8 @@ static void test_bad_input(void) {
   T_STATUS(batten_fmm_apply(ctx, f, w, NULL, u, NULL), BATTEN_E_INVALID, ctx, "weights[2]: nan; must be finite");
   w[2] = 3;
   T_STATUS(batten_fmm_apply(ctx, NULL, w, NULL, u, NULL), BATTEN_E_INVALID, ctx, "fmm: NULL");
-  T_STATUS(batten_fmm_error(ctx, f, w, NULL, u, NULL, 3, 1, NULL, NULL), BATTEN_E_INVALID, ctx, "values, value_error");
+  T_STATUS(batten_fmm_error(ctx, f, w, NULL, u, NULL, 3, 1, NULL, NULL), BATTEN_E_INVALID, ctx,
+           "values, value_error");
   batten_fmm *g = NULL;
   o.share = f;
   T_STATUS(batten_fmm_create(ctx, &(batten_radial){2, 4, 1}, 3, x, 3, NULL, &o, &g), BATTEN_E_INVALID, ctx,
@@ -144,7 +145,8 @@ static void test_invariances(const fmm_scene *s, const batten_radial *k) {
   }
   other = product(&r, k, 2, moved, weights, 1e-5);
   double largest = 0, norm = 0;
-  for (size_t i = 0; i < COUNT; i++) largest = fmax(largest, fabs(other[COUNT - 1 - i] - one[i])), norm = fmax(norm, fabs(one[i]));
+  for (size_t i = 0; i < COUNT; i++)
+    largest = fmax(largest, fabs(other[COUNT - 1 - i] - one[i])), norm = fmax(norm, fabs(one[i]));
   T_RATIO(largest, 1e-12 * norm, "%u-D: in the reverse order", s->n);
   free(r.g), free(other), free(one), free(moved), free(weights);
 }
@@ -169,7 +171,8 @@ static void test_share(void) {
 /* Each inner loop of each instruction set against that of the widest. */
 static void test_same_bits(void) {
   enum { ORDER = 7, FULL = 343, TERMS = 75, DEPTH = 31, OUT = 4096 };
-  static double first[OUT], other[OUT], numbers[7 * TERMS], *terms[7], panel[DEPTH * FMM_PANEL], b[FMM_COLUMNS * DEPTH], scratch[8 * 49];
+  static double first[OUT], other[OUT], numbers[7 * TERMS], *terms[7], panel[DEPTH * FMM_PANEL],
+      b[FMM_COLUMNS * DEPTH], scratch[8 * 49];
   uint64_t seed = 4;
   size_t sets = 0, differ = 0;
   for (size_t i = 0; i < 7 * TERMS; i++) numbers[i] = 2 * t_uniform(&seed) - 1;

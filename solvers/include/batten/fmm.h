@@ -27,12 +27,14 @@ typedef struct batten_fmm batten_fmm;
 typedef struct batten_fmm_options {
   size_t struct_size;
   double accuracy; /* 2-norm of the error of the values over that of the values, wanted for weights of mixed signs;
-                      1e-12 .. 1e-3. Smaller costs more. Default 1e-8. Weights whose sums cancel further lose as many
-                      digits as direct sums in a precision of that many digits would: see batten_fmm_error(). */
+                      1e-12 .. 1e-3. Smaller costs more. Default 1e-8. It is what points and weights without order
+                      get, mostly a few times less; batten_fmm_error() says what others got: sums that cancel further
+                      lose as many digits as they would in a precision of that many digits, points that all lie near
+                      corners of cells of the tree lose one. */
   int gradients;   /* non-zero: batten_fmm_apply() will be asked for gradients. Default 0. */
   int dipoles;     /* non-zero: sources may have gradient terms g_j. Default 0. */
-  const batten_fmm *share; /* a plan of the same kernel, accuracy, gradients and dipoles, whose operators are used again
-                              in place of new ones; it may be freed before this plan. Default NULL. */
+  const batten_fmm *share; /* a plan of the same kernel, accuracy, gradients and dipoles, whose operators are
+                              used again in place of new ones; it may be freed before this plan. Default NULL. */
 } batten_fmm_options;
 BATTEN_API batten_fmm_options batten_fmm_options_default(void);
 
@@ -60,8 +62,8 @@ BATTEN_API size_t batten_fmm_bytes(const batten_radial *kernel, size_t source_co
  *   targets  [target_count][n]; NULL: the sources, target_count is then their count
  *   opt      NULL for defaults
  *   out      freed by batten_fmm_free; untouched on failure
- * The arrays are copied. Fails: INVALID, TOO_LARGE, NOMEM, CANCELLED. Time O(S + T), and that of the operators (rising
- * steeply with the accuracy, the same for all numbers of points) unless they are shared. */
+ * The arrays are copied. Fails: INVALID, TOO_LARGE, NOMEM, CANCELLED. Time O(S + T), and that of the operators
+ * (rising steeply with the accuracy, the same for all numbers of points) unless they are shared. */
 BATTEN_API batten_status batten_fmm_create(batten_context *ctx, const batten_radial *kernel, size_t source_count,
                                            const double *sources, size_t target_count, const double *targets,
                                            const batten_fmm_options *opt, batten_fmm **out);
@@ -71,15 +73,15 @@ BATTEN_API batten_status batten_fmm_create(batten_context *ctx, const batten_rad
  *   dipoles    [source_count][n] g_j, finite; NULL: none. Only for plans made with opt.dipoles.
  *   values     [target_count] u; may be NULL
  *   gradients  [target_count][n] grad u; may be NULL. Only for plans made with opt.gradients.
- * Terms that have no limit at r = 0 count as 0 there, as batten_spline_evaluate() has it. The same bits for any number
- * of threads and any instruction set. One product at a time on a plan. ctx is the one that the plan was made with.
+ * Terms that have no limit at r = 0 count as 0 there, as batten_spline_evaluate() has it. The same bits for any
+ * number of threads and any instruction set. One product at a time on a plan. ctx is the one that the plan was made with.
  * Fails: INVALID, NOMEM, CANCELLED (phase "sums"); outputs are untouched then. */
 BATTEN_API batten_status batten_fmm_apply(batten_context *ctx, batten_fmm *fmm, const double *weights,
                                           const double *dipoles, double *values, double *gradients);
 
 /* What a product is really worth: u is summed directly at `rows` targets drawn by seed (all of them when rows is
- * target_count or more). *value_error and *gradient_error are the 2-norm of the difference to values and gradients there
- * over the 2-norm of the direct sums (0 when both are 0); either pair may be NULL. Time O(rows S).
+ * target_count or more). *value_error and *gradient_error are the 2-norm of the difference to values and gradients
+ * there over the 2-norm of the direct sums (0 when both are 0); either pair may be NULL. Time O(rows S).
  * Fails: INVALID, NOMEM, CANCELLED. */
 BATTEN_API batten_status batten_fmm_error(batten_context *ctx, const batten_fmm *fmm, const double *weights,
                                           const double *dipoles, const double *values, const double *gradients,
