@@ -24,6 +24,7 @@ enum {
   OPT_ORIENT_DATA,
   OPT_ORIENT_METHOD,
   OPT_METHOD,
+  OPT_ACCURACY,
   OPT_LOO
 };
 
@@ -43,7 +44,8 @@ static const cli_option table[] = {
      "of the file), estimate; default auto"},
     {"orient-data", OPT_ORIENT_DATA, "WHAT", "orientation enters as auto, gradients or pairs; default auto"},
     {"orient-method", OPT_ORIENT_METHOD, "HOW", "estimated by auto, energy or planes; default auto"},
-    {"method", OPT_METHOD, "NAME", "linear solver: auto, cholesky, mixed, ldl or qr; default auto"},
+    {"method", OPT_METHOD, "NAME", "linear solver: auto, cholesky, mixed, ldl, qr or iterative (for many\npoints); default auto"},
+    {"accuracy", OPT_ACCURACY, "EPS", "residual that an iterative solver aims at; default 1e-6"},
     {"cell", BODY_KEY_CELL, "LENGTH",
      "edge length of the mesh; default from the points' spacing, but at most\n1/120 of the diagonal of their box"},
     BODY_OPTION_SHARP("0"),
@@ -82,7 +84,7 @@ static bool take_fit_option(solid_request *q, int key, const char *v) {
   static const char *const orientations[] = {"auto", "never", "given", "estimate", NULL};
   static const char *const orient_data[] = {"auto", "gradients", "pairs", NULL};
   static const char *const orient_methods[] = {"auto", "energy", "planes", NULL};
-  static const char *const methods[] = {"auto", "cholesky", "mixed", "ldl", "qr", NULL};
+  static const char *const methods[] = {"auto", "cholesky", "mixed", "ldl", "qr", "iterative", NULL};
   int word = 0;
   size_t count = 0;
   bool ok = true;
@@ -115,6 +117,9 @@ static bool take_fit_option(solid_request *q, int key, const char *v) {
     case OPT_METHOD:
       ok = cli_parse_word("--method", v, methods, &word);
       q->fit.spline.saddle.method = (batten_saddle_method)word;
+      break;
+    case OPT_ACCURACY:
+      ok = cli_parse_number("--accuracy", v, 1e-13, 0.1, &q->fit.spline.saddle.accuracy);
       break;
     default:
       if (strcmp(v, "all") == 0)

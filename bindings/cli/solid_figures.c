@@ -26,9 +26,24 @@ static const char *carrier_name(const solid_work *w) {
   return batten_carrier_kind_name(parts.kind);
 }
 
+/* Figures that only the iterative solver has, null for the others. */
+static void report_iteration(const solid_work *w, cli_report *r) {
+  const batten_saddle_info *s = &w->info.spline.saddle;
+  const bool used = s->method == BATTEN_SADDLE_ITERATIVE;
+  cli_report_number(r, "accuracy", used ? w->request->fit.spline.saddle.accuracy : NAN);
+  cli_report_number(r, "residual_rows", used ? s->residual_rows : NAN);
+  cli_report_number(r, "rows_checked", used ? (double)s->rows_checked : NAN);
+  cli_report_number(r, "iterations", used ? s->iterations : NAN);
+  cli_report_number(r, "levels", used ? s->levels : NAN);
+  cli_report_number(r, "domains", used ? (double)s->domains : NAN);
+  cli_report_number(r, "products_accuracy", used ? s->products_accuracy : NAN);
+  cli_report_number(r, "time_setup_s", used ? s->time_setup_s : NAN);
+}
+
 static void report_fit(const solid_work *w, cli_report *r) {
   const batten_solid_info *i = &w->info;
   const batten_saddle_info *s = &i->spline.saddle;
+  const bool iterative = s->method == BATTEN_SADDLE_ITERATIVE;
   batten_spline_parts parts = {.struct_size = sizeof parts};
   batten_spline_get_parts(batten_solid_spline(w->body.solid), &parts);
   cli_report_text(r, "carrier", carrier_name(w));
@@ -36,9 +51,10 @@ static void report_fit(const solid_work *w, cli_report *r) {
   cli_report_number(r, "smoothing", w->request->fit.spline.smoothing);
   cli_report_text(r, "method", batten_saddle_method_name(s->method));
   cli_report_count(r, "fallbacks", s->fallbacks);
+  report_iteration(w, r);
   cli_report_number(r, "residual_max", i->residual_max);
   cli_report_number(r, "distance_max", i->distance_max);
-  cli_report_number(r, "rcond", s->rcond);
+  cli_report_number(r, "rcond", iterative ? NAN : s->rcond);
   cli_report_number(r, "loo_rms", i->spline.loo_rms);
   cli_report_count(r, "loo_samples", i->spline.loo_samples);
   cli_report_count(r, "refinements", s->refinements);
@@ -49,7 +65,7 @@ static void report_fit(const solid_work *w, cli_report *r) {
   cli_report_number(r, "time_assemble_s", s->time_assemble_s);
   cli_report_number(r, "time_project_s", s->time_project_s);
   cli_report_number(r, "time_factor_s", s->time_factor_s);
-  cli_report_number(r, "time_solve_s", s->time_project_s + s->time_factor_s + s->time_solve_s);
+  cli_report_number(r, "time_solve_s", s->time_project_s + s->time_factor_s + s->time_setup_s + s->time_solve_s);
   cli_report_number(r, "time_fit_s", i->time_fit_s);
   cli_report_number(r, "time_check_s", i->time_check_s);
   cli_report_number(r, "time_orient_s", i->time_orient_s);

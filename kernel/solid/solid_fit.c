@@ -220,15 +220,23 @@ static batten_status try_oriented(fit_state *f, batten_orient_data data, attempt
 
 /* ---- the cure ------------------------------------------------------------------------------------ */
 
-static bool is_good(const attempt *a) { return a->check.clean && a->spline.residual_max <= RESIDUAL; }
+/* Iteration promises a 2-norm, factors every point. */
+static bool is_iterative(const batten_spline_info *i) { return i->saddle.method == BATTEN_SADDLE_ITERATIVE; }
+
+static bool is_accurate(const fit_state *f, const batten_spline_info *i) {
+  if (is_iterative(i)) return i->saddle.residual_rows <= f->opt.spline.saddle.accuracy;
+  return i->residual_max <= RESIDUAL;
+}
+
+static bool is_good(const fit_state *f, const attempt *a) { return a->check.clean && is_accurate(f, &a->spline); }
 
 static size_t complaints(const batten_sign_check *c) {
   return c->weak_gradients + c->flipped_neighbours + c->phantom_components + c->phantom_cells;
 }
 
-static bool is_better(const attempt *a, const attempt *b) {
-  if (!b->solid || is_good(a)) return true;
-  if (is_good(b)) return false;
+static bool is_better(const fit_state *f, const attempt *a, const attempt *b) {
+  if (!b->solid || is_good(f, a)) return true;
+  if (is_good(f, b)) return false;
   if (a->check.clean != b->check.clean) return a->check.clean;
   size_t of_a = complaints(&a->check), of_b = complaints(&b->check);
   return of_a < of_b || (of_a == of_b && a->spline.residual_max < b->spline.residual_max);
@@ -286,11 +294,11 @@ static batten_status cure(fit_state *f) {
   }
   batten_status st = orient(f);
   for (int k = 0; st >= 0 && k < 2; k++) {
-    if (is_good(&f->best) && f->best.data != BATTEN_ORIENT_DATA_AUTO) break;
+    if (is_good(f, &f->best) && f->best.data != BATTEN_ORIENT_DATA_AUTO) break;
     if (k == 1 && kinds[1] == kinds[0]) break;
     attempt next = {0};
     st = try_oriented(f, kinds[k], &next);
-    if (st >= 0 && is_better(&next, &f->best)) {
+    if (st >= 0 && is_better(f, &next, &f->best)) {
       batten_solid_free(f->best.solid);
       f->best = next;
       next.solid = NULL;
@@ -357,7 +365,12 @@ static batten_status finish(fit_state *f) {
   /* The saddle solver's tolerance is for its equations; here counts how near f comes to 0, or, where smoothing keeps
    * it away, the spline to what it aims at. */
   double miss = fmin(info->residual_max, info->spline.residual_max);
-  if (miss <= RESIDUAL) return BATTEN_OK;
+  if (miss <= RESIDUAL || (is_iterative(&info->spline) && is_accurate(f, &info->spline))) return BATTEN_OK;
+  if (is_iterative(&info->spline))
+    return batten_fail(f->ctx, BATTEN_W_ACCURACY,
+                       "points: residual %.3g (2-norm), above opt.spline.saddle.accuracy = %g, and the surface up to "
+                       "%.3g away from them; ask for less, or give opt.merge_radius or opt.spline.smoothing",
+                       info->spline.saddle.residual_rows, f->opt.spline.saddle.accuracy, info->distance_max);
   return batten_fail(f->ctx, BATTEN_W_ACCURACY,
                      "points: |f| is up to %.3g of the values' range, %g allowed, and the surface up to %.3g away "
                      "from them; give %sopt.merge_radius or opt.spline.smoothing",

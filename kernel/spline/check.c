@@ -30,6 +30,14 @@ static batten_status check_orders(batten_context *ctx, const batten_spline_data 
   return BATTEN_OK;
 }
 
+static batten_status check_method(batten_context *ctx, const batten_spline_data *data,
+                                  const batten_spline_options *opt) {
+  if (opt->saddle.method != BATTEN_SADDLE_ITERATIVE || batten_spline_sums_exist(data->n)) return BATTEN_OK;
+  return batten_fail(ctx, BATTEN_E_INVALID,
+                     "opt.saddle.method: iterative with data.n = %u; it is for n = 2 and 3, choose another method",
+                     data->n);
+}
+
 static batten_status check_gradients(batten_context *ctx, const batten_spline_data *data) {
   const size_t count = data->gradient_count;
   if (count > data->count)
@@ -59,6 +67,7 @@ batten_status batten_spline_check_data(batten_context *ctx, const batten_spline_
   if (st < 0) return st;
   if ((st = batten_check_struct(ctx, "batten_spline_options", opt->struct_size, sizeof *opt)) < 0) return st;
   if ((st = check_orders(ctx, data, opt->m)) < 0) return st;
+  if ((st = check_method(ctx, data, opt)) < 0) return st;
   size_t bytes;
   if (!batten_mul3(data->count, data->n, sizeof(double), &bytes))
     return batten_fail(ctx, BATTEN_E_TOO_LARGE, "data.count: %zu", data->count);

@@ -15,6 +15,11 @@
 /* Residuals above this part of the data's range are a warning. */
 static const double RESIDUAL_PROMISED = 1e-10;
 
+/* Residuals of a fit by iteration are looked at directly at all points where that takes no more than so many terms (some
+ * tenths of a second), else at so many points as that allows, and at a thousand at least: fast sums would add an error
+ * of their own, of the size of what is looked for. */
+static const size_t RESIDUAL_TERMS = 1000000000, RESIDUAL_POINTS = 1000;
+
 typedef struct fit {
   batten_context *ctx;
   const batten_spline_data *data;
@@ -36,6 +41,17 @@ batten_spline_options batten_spline_options_default(void) {
                                  .saddle = batten_saddle_options_default()};
 }
 
+/* Of the iterative solver with its products with K. Those of its levels, whose points fall off by four or more from
+ * one to the next, take about as much again as the main one. */
+static size_t iterative_bytes(unsigned n, unsigned m, size_t points, size_t gradients, double accuracy) {
+  size_t rows, sums, bytes, total;
+  batten_mul(n, gradients, &rows);
+  batten_add(rows, points, &rows);
+  batten_mul(2, batten_spline_sums_bytes(n, m, points, gradients, accuracy), &sums);
+  bytes = batten_saddle_bytes(BATTEN_SADDLE_ITERATIVE, rows, batten_polynomial_count(n, m - 1));
+  return batten_add(bytes, sums, &total) ? total : SIZE_MAX;
+}
+
 /* Peak: the factor with the 64 right sides that leave-one-out errors take at a time, beside the system. */
 size_t batten_spline_bytes(batten_saddle_method method, unsigned n, unsigned m, size_t points, size_t gradients) {
   if (!batten_green_exists(n, m)) return SIZE_MAX;
@@ -44,7 +60,10 @@ size_t batten_spline_bytes(batten_saddle_method method, unsigned n, unsigned m, 
   if (!batten_mul(n, gradients, &rows) || !batten_add(rows, points, &rows)) return SIZE_MAX;
   /* P, f, w, coordinates (at most n a row), samples (index, diagonal) and the right sides. */
   if (!batten_mul3(rows + 1, k + 2 + n + 2 + 64 + 1, sizeof(double), &own)) return SIZE_MAX;
-  bytes = batten_saddle_bytes(method, rows, k);
+  if (method == BATTEN_SADDLE_ITERATIVE)
+    bytes = iterative_bytes(n, m, points, gradients, batten_saddle_options_default().accuracy);
+  else
+    bytes = batten_saddle_bytes(method, rows, k);
   return batten_add(bytes, own, &total) ? total : SIZE_MAX;
 }
 
@@ -64,12 +83,12 @@ static double value_range(const batten_spline_data *d, double *middle) {
   return upper - lower;
 }
 
-/* Largest |gradient|, [M][n]. */
-static double largest_gradient(const batten_spline_data *d, const double *gradients) {
+/* Of count vectors of n components. */
+static double largest_length(size_t n, size_t count, const double *vectors) {
   double largest = 0;
-  for (size_t q = 0; q < d->gradient_count; q++) {
+  for (size_t q = 0; q < count; q++) {
     double square = 0;
-    for (unsigned a = 0; a < d->n; a++) square += gradients[q * d->n + a] * gradients[q * d->n + a];
+    for (size_t a = 0; a < n; a++) square += vectors[q * n + a] * vectors[q * n + a];
     if (!(square <= largest)) largest = square;
   }
   return sqrt(largest);
@@ -78,7 +97,7 @@ static double largest_gradient(const batten_spline_data *d, const double *gradie
 static batten_status make_right_side(fit *t) {
   const batten_spline_data *d = t->data;
   const spline_system *s = &t->system;
-  double range = value_range(d, &t->middle), slope = s->scale * largest_gradient(d, d->gradients);
+  double range = value_range(d, &t->middle), slope = s->scale * largest_length(d->n, d->gradient_count, d->gradients);
   double largest = fmax(0.5 * range, slope);
   if (!(largest <= 1e150))
     return batten_fail(t->ctx, BATTEN_E_INVALID,
@@ -145,8 +164,28 @@ static batten_status fail_singular(const fit *t, const char *detail) {
       s->count, s->m - 1, s->m, detail);
 }
 
-static batten_status solve(fit *t) {
+/* From so many unknowns on iteration takes less time than the factors do, for the kernels that it takes easily: r, and
+ * r^2 ln r in the plane (benchmarks/bench_large). Its residual is then what saddle.accuracy asks for, not rounding: the
+ * limit is kept well above where the times meet. */
+enum { ITERATIVE_FROM = 12000 };
+
+/* Where no factor has room, iteration is tried from so many unknowns on, whatever the kernel. */
+enum { ITERATIVE_FROM_SMALL = 2000 };
+
+static batten_saddle_method choose_method(const fit *t) {
   const spline_system *s = &t->system;
+  const batten_saddle_method asked = t->opt.saddle.method;
+  if (asked != BATTEN_SADDLE_AUTO || !batten_spline_sums_exist(s->n) || s->rows < ITERATIVE_FROM_SMALL) return asked;
+  const size_t available = batten_bytes_available(t->ctx);
+  const bool easy = s->power <= 2 && s->rows >= ITERATIVE_FROM;
+  const bool dense_fits = batten_saddle_bytes(BATTEN_SADDLE_CHOLESKY_MIXED, s->rows, s->basis.count) <= available;
+  if (!easy && dense_fits) return asked;
+  const size_t bytes = iterative_bytes(s->n, s->m, s->count, s->gradient_count, t->opt.saddle.accuracy);
+  return bytes <= available ? BATTEN_SADDLE_ITERATIVE : asked;
+}
+
+static batten_status solve(fit *t) {
+  spline_system *s = &t->system;
   if (s->rows == s->basis.count) {
     t->info.saddle.rcond = NAN;
     return solve_polynomial(t) ? BATTEN_OK : fail_singular(t, "as many conditions as monomials");
@@ -155,12 +194,25 @@ static batten_status solve(fit *t) {
       .n = s->rows, .k = s->basis.count, .p = s->p, .fill = batten_spline_system_fill, .user = s};
   batten_saddle_options o = t->opt.saddle;
   if (s->power > 1) o.smooth_kernel = 1;
-  batten_status st = batten_saddle_factor(t->ctx, &matrix, &o, &t->saddle);
+  o.method = choose_method(t);
+  batten_status st = BATTEN_OK;
+  if (o.method == BATTEN_SADDLE_ITERATIVE) {
+    if ((st = batten_spline_sums_make(t->ctx, s)) < 0) return st;
+    matrix.sums = &s->sums->calls;
+  }
+  st = batten_saddle_factor(t->ctx, &matrix, &o, &t->saddle);
   if (st >= 0) st = batten_saddle_solve(t->ctx, t->saddle, t->f, t->w, t->c);
   if (st == BATTEN_E_SINGULAR) return fail_singular(t, batten_error(t->ctx));
   if (st >= 0) t->info.saddle = batten_saddle_get_info(t->saddle);
-  /* Its accuracy is judged on the spline, by check_residuals. */
+  /* The accuracy of factors is judged on the spline, by judge. */
   return st < 0 ? st : BATTEN_OK;
+}
+
+static bool is_iterative(const fit *t) { return t->info.saddle.method == BATTEN_SADDLE_ITERATIVE; }
+
+/* Number q of `samples` out of `count`, evenly drawn. */
+static size_t drawn(size_t q, size_t samples, size_t count) {
+  return q * (count / samples) + q * (count % samples) / samples;
 }
 
 /* ---- leave-one-out ---- */
@@ -172,12 +224,12 @@ static batten_status leave_one_out(fit *t) {
   const size_t count = t->system.count;
   size_t samples = t->opt.loo_samples < count ? t->opt.loo_samples : count;
   t->info.loo_rms = NAN;
-  if (!t->saddle || samples == 0) return BATTEN_OK;
+  if (!t->saddle || is_iterative(t) || samples == 0) return BATTEN_OK;
   batten_status st = BATTEN_E_NOMEM;
   double *diagonal = batten_alloc_array(t->ctx, samples, sizeof *diagonal), largest = 0, sum = 0;
   size_t *index = batten_alloc_array(t->ctx, samples, sizeof *index), used = 0;
   if (!diagonal || !index) goto done;
-  for (size_t q = 0; q < samples; q++) index[q] = q * (count / samples) + q * (count % samples) / samples;
+  for (size_t q = 0; q < samples; q++) index[q] = drawn(q, samples, count);
   st = batten_saddle_inverse_diagonal(t->ctx, t->saddle, samples, index, diagonal);
   if (st < 0) goto done;
   for (size_t q = 0; q < samples; q++) largest = fmax(largest, fabs(diagonal[q]));
@@ -241,37 +293,84 @@ done:
   return st;
 }
 
-/* Values at all points, gradients at those that have one; w has room for both: N + n M. */
+/* Points out of count to look at. */
+static size_t points_to_check(const fit *t, size_t count) {
+  if (!is_iterative(t)) return count;
+  const size_t most = RESIDUAL_TERMS / t->system.rows;
+  if (count <= most || count <= RESIDUAL_POINTS) return count;
+  return most > RESIDUAL_POINTS ? most : RESIDUAL_POINTS;
+}
+
+/* The largest miss of a value, at points evenly drawn; f has room for values. */
+static batten_status check_values(fit *t, double *worst) {
+  const batten_spline_data *d = t->data;
+  const size_t n = d->n, checked = points_to_check(t, d->count);
+  const double *points = d->points;
+  double *values = t->f, *some = NULL;
+  batten_status st = BATTEN_OK;
+  if (checked < d->count) {
+    some = batten_alloc_array(t->ctx, checked, n * sizeof *some);
+    if (!some) return BATTEN_E_NOMEM;
+    for (size_t q = 0; q < checked; q++)
+      memcpy(some + q * n, d->points + drawn(q, checked, d->count) * n, n * sizeof *some);
+    points = some;
+  }
+  st = batten_spline_evaluate(t->ctx, t->spline, checked, points, values, NULL, NULL);
+  batten_free(t->ctx, some);
+  if (st < 0) return st;
+  for (size_t q = 0; q < checked; q++) {
+    const size_t i = drawn(q, checked, d->count);
+    double miss = fabs(values[q] + smoothing_at(t, i) * t->w[i] - d->values[i]);
+    if (!(miss <= *worst)) *worst = miss;
+  }
+  t->info.residual_points = checked;
+  return BATTEN_OK;
+}
+
+/* The largest length of a miss of a gradient. w and f have room for N + n M numbers, and nobody needs them any more. */
+static batten_status check_gradients(fit *t, double *worst) {
+  const batten_spline_data *d = t->data;
+  const size_t n = d->n, count = d->gradient_count, checked = points_to_check(t, count);
+  double *points = t->w, *gradients = t->f;
+  for (size_t q = 0; q < checked; q++) {
+    const size_t g = drawn(q, checked, count), at = d->gradient_at ? d->gradient_at[g] : g;
+    memcpy(points + q * n, d->points + at * n, n * sizeof *points);
+  }
+  batten_status st = batten_spline_evaluate(t->ctx, t->spline, checked, points, NULL, gradients, NULL);
+  if (st < 0) return st;
+  for (size_t q = 0; q < checked; q++)
+    for (size_t a = 0; a < n; a++) gradients[q * n + a] -= d->gradients[drawn(q, checked, count) * n + a];
+  *worst = largest_length(n, checked, gradients);
+  return BATTEN_OK;
+}
+
 static batten_status find_residuals(fit *t) {
   const batten_spline_data *d = t->data;
-  const spline_system *s = &t->system;
-  double middle, range = value_range(d, &middle), slope = largest_gradient(d, d->gradients), worst = 0;
-  double *values = t->f, *gradients = values + s->count;
-  batten_status st = batten_spline_evaluate(t->ctx, t->spline, s->count, d->points, values, NULL, NULL);
+  double middle, range = value_range(d, &middle), slope = largest_length(d->n, d->gradient_count, d->gradients);
+  double worst = 0;
+  batten_status st = check_values(t, &worst);
   if (st < 0) return st;
-  for (size_t i = 0; i < s->count; i++) {
-    double miss = fabs(values[i] + smoothing_at(t, i) * t->w[i] - d->values[i]);
-    if (!(miss <= worst)) worst = miss;
-  }
   /* Values that are all the same (a surface with its normals) have no range: the gradients say what is much. */
-  if (range == 0) range = slope > 0 ? slope * s->scale : fabs(d->values[0]);
+  if (range == 0) range = slope > 0 ? slope * t->system.scale : fabs(d->values[0]);
   t->info.residual_max = range > 0 ? worst / range : worst;
-  if (s->gradient_count == 0) return BATTEN_OK;
-  /* The points with gradients go where w was. */
-  double *points = t->w;
-  for (size_t q = 0; q < s->gradient_count; q++)
-    for (unsigned a = 0; a < s->n; a++)
-      points[q * s->n + a] = d->points[(d->gradient_at ? d->gradient_at[q] : q) * s->n + a];
-  st = batten_spline_evaluate(t->ctx, t->spline, s->gradient_count, points, NULL, gradients, NULL);
-  if (st < 0) return st;
-  for (size_t q = 0; q < s->gradient_count * s->n; q++) gradients[q] -= d->gradients[q];
-  worst = largest_gradient(d, gradients);
-  if (slope == 0) slope = range / s->scale;
+  if (d->gradient_count == 0) return BATTEN_OK;
+  if ((st = check_gradients(t, &worst)) < 0) return st;
+  if (slope == 0) slope = range / t->system.scale;
   t->info.gradient_residual_max = slope > 0 ? worst / slope : worst;
   return BATTEN_OK;
 }
 
+/* Factors promise every point, iteration what it was asked for. */
 static batten_status judge(const fit *t) {
+  const batten_saddle_info *s = &t->info.saddle;
+  if (is_iterative(t)) {
+    if (s->residual_rows <= t->opt.saddle.accuracy) return BATTEN_OK;
+    return batten_fail(t->ctx, BATTEN_W_ACCURACY,
+                       "residual: %.3g of the data less their best polynomial (2-norm over %zu points) after %u "
+                       "iterations, above opt.saddle.accuracy = %g; ask for less, merge points that nearly coincide, "
+                       "lower m, or set opt.smoothing",
+                       s->residual_rows, s->rows_checked, s->iterations, t->opt.saddle.accuracy);
+  }
   double middle, range = value_range(t->data, &middle),
                  worst = fmax(t->info.residual_max, t->info.gradient_residual_max);
   /* Values about 1e8 with a range of 1 have only 8 digits of it to be met. */
@@ -299,6 +398,7 @@ batten_status batten_spline_fit(batten_context *ctx, const batten_spline_data *d
   t.info.energy = energy(&t);
   batten_saddle_free(t.saddle); /* the factor is the bulk of the memory, and done with */
   t.saddle = NULL;
+  batten_spline_sums_free(ctx, &t.system);
   if ((st = make_spline(&t)) < 0) goto done;
   if ((st = find_residuals(&t)) < 0) goto done;
   st = judge(&t);

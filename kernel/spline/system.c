@@ -52,6 +52,7 @@ batten_status batten_spline_system_make(batten_context *ctx, const batten_spline
                        .power = batten_green_power(data->n, opt->m),
                        .count = count,
                        .gradient_count = gradients,
+                       .gradient_at = data->gradient_at,
                        .basis = batten_polynomial_basis(data->n, opt->m - 1),
                        .smoothing = opt->smoothing,
                        .smoothing_per_point = opt->smoothing_per_point,
@@ -81,6 +82,7 @@ void batten_spline_system_free(batten_context *ctx, spline_system *s) {
     batten_free(ctx, s->gy[a]);
   }
   batten_free(ctx, s->p);
+  batten_spline_sums_free(ctx, s);
 }
 
 /* The part of rows (or columns) that have one kind of functional. */

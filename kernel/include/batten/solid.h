@@ -107,7 +107,8 @@ typedef struct batten_solid_info {
 } batten_solid_info;
 
 /* Fit to points [count][n], n = 2 or 3. In one dimension an even number of points bounds intervals, and their order
- * orients them. Positive status: BATTEN_W_AMBIGUOUS, BATTEN_W_ACCURACY (residual_max above 1e-10). Fails as
+ * orients them. Positive status: BATTEN_W_AMBIGUOUS, BATTEN_W_ACCURACY (residual_max above 1e-10; by ITERATIVE,
+ * spline.saddle.residual_rows above opt.spline.saddle.accuracy). Fails as
  * batten_spline_fit, and INVALID for a carrier that the spline reproduces (the text says which to take): every
  * carrier alone with m >= 3 needs orientation, and without a carrier of the caller's it is estimated at once. *out
  * untouched on failure; info may be NULL. The check costs (about 1.5 check_cells)^n evaluations of f. */

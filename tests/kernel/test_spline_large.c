@@ -1,0 +1,318 @@
+/* Splines of many points: fits by iteration, against the factors where they still serve. */
+#include "tap.h"
+
+#include <batten/spline.h>
+#include <float.h>
+
+typedef struct cloud {
+  unsigned n;
+  size_t count;
+  double *points, *values, *gradients;
+} cloud;
+
+/* No polynomial of low degree. */
+static double smooth(unsigned n, const double *x, double *g) {
+  const double k[3] = {3, 2, -4};
+  double t = 0.3;
+  for (unsigned a = 0; a < n; a++) t += k[a] * x[a];
+  for (unsigned a = 0; a < n; a++) g[a] = k[a] * cos(t) + (a == 0 ? 0.4 * x[0] : 0);
+  return sin(t) + 0.2 * x[0] * x[0];
+}
+
+/* Random points of the unit box, their coordinates multiples of 2^-24: with 7e6 added they are still exact. */
+static cloud make_cloud(unsigned n, size_t count) {
+  cloud c = {.n = n, .count = count};
+  uint64_t seed = 100 * n + count;
+  c.points = malloc(count * n * sizeof(double));
+  c.values = malloc(count * sizeof(double));
+  c.gradients = malloc(count * n * sizeof(double));
+  for (size_t i = 0; i < count * n; i++) c.points[i] = ldexp((double)(t_random(&seed) >> 40), -24);
+  for (size_t i = 0; i < count; i++) c.values[i] = smooth(n, c.points + i * n, c.gradients + i * n);
+  return c;
+}
+
+/* Points of a bumpy sphere with what is left of a function on it: the case of solids. */
+static cloud make_sphere(size_t count) {
+  cloud c = make_cloud(3, count);
+  uint64_t seed = 5;
+  for (size_t i = 0; i < count; i++) {
+    double *x = c.points + 3 * i, z = 2 * t_uniform(&seed) - 1, a = 8 * atan(1) * t_uniform(&seed), s = sqrt(1 - z * z);
+    double radius = 1 + 0.1 * sin(5 * a) * s * s + 0.05 * cos(9 * z);
+    x[0] = radius * s * cos(a), x[1] = radius * s * sin(a), x[2] = radius * z;
+    c.values[i] = x[0] * x[0] + x[1] * x[1] + x[2] * x[2] - 1;
+  }
+  return c;
+}
+
+static void free_cloud(cloud *c) {
+  free(c->points);
+  free(c->values);
+  free(c->gradients);
+}
+
+static batten_spline_data data_of(const cloud *c, bool hermite) {
+  batten_spline_data d = batten_spline_data_default();
+  d.n = c->n;
+  d.count = c->count;
+  d.points = c->points;
+  d.values = c->values;
+  if (hermite) {
+    d.gradient_count = c->count;
+    d.gradients = c->gradients;
+  }
+  return d;
+}
+
+static batten_spline_options options_of(unsigned m, batten_saddle_method method, double accuracy) {
+  batten_spline_options o = batten_spline_options_default();
+  o.m = m;
+  o.saddle.method = method;
+  o.saddle.accuracy = accuracy;
+  return o;
+}
+
+/* NULL, and a failed line, when there is none. */
+static batten_spline *fit(batten_context *ctx, const batten_spline_data *d, const batten_spline_options *o,
+                          batten_spline_info *info) {
+  batten_spline *s = NULL;
+  batten_status st = batten_spline_fit(ctx, d, o, &s, info);
+  if (st != BATTEN_OK) T_CHECK(false, "fit n = %u, m = %u, N = %zu: %s", d->n, o->m, d->count, batten_error(ctx));
+  return s;
+}
+
+/* Largest difference of two splines at points of the unit box, at `at` in the box of the second. */
+static double difference(batten_context *ctx, unsigned n, const batten_spline *a, const batten_spline *b) {
+  enum { TRIALS = 500 };
+  double *x = malloc(TRIALS * (n + 2) * sizeof *x), *u = x + TRIALS * n, *v = u + TRIALS, worst = 0;
+  uint64_t seed = 77;
+  for (size_t i = 0; i < TRIALS * n; i++) x[i] = t_uniform(&seed);
+  if (!a || !b || batten_spline_evaluate(ctx, a, TRIALS, x, u, NULL, NULL) < 0 ||
+      batten_spline_evaluate(ctx, b, TRIALS, x, v, NULL, NULL) < 0)
+    worst = INFINITY;
+  for (size_t i = 0; i < TRIALS; i++) worst = fmax(worst, fabs(u[i] - v[i]));
+  free(x);
+  return worst;
+}
+
+/* ---- against the factors ---- */
+
+/* allowed: how far the two may be apart, in units of the accuracy. */
+static void compare(batten_context *ctx, const char *what, const cloud *c, bool hermite, unsigned m, double smoothing,
+                    const double *per_point, double accuracy, double allowed) {
+  batten_spline_data d = data_of(c, hermite);
+  batten_spline_options o = options_of(m, BATTEN_SADDLE_CHOLESKY, accuracy);
+  o.smoothing = smoothing;
+  o.smoothing_per_point = per_point;
+  o.loo_samples = 0;
+  batten_spline_info info = {0};
+  double start = batten_now();
+  batten_spline *exact = fit(ctx, &d, &o, &info);
+  const double energy = info.energy, dense_s = batten_now() - start;
+  o.saddle.method = BATTEN_SADDLE_ITERATIVE;
+  o.loo_samples = 256;
+  start = batten_now();
+  batten_spline *s = fit(ctx, &d, &o, &info);
+  printf("# %s, N = %zu: %.2f s (dense %.2f), %u levels, %u iterations, products %.0e, residual %.1e (2-norm) %.1e "
+         "(largest)\n",
+         what, c->count, batten_now() - start, dense_s, info.saddle.levels, info.saddle.iterations,
+         info.saddle.products_accuracy, info.saddle.residual_rows, info.residual_max);
+  T_CHECK(info.saddle.method == BATTEN_SADDLE_ITERATIVE && info.residual_points == c->count, "%s: by iteration", what);
+  T_CHECK(isnan(info.loo_rms) && info.loo_samples == 0, "%s: no leave-one-out errors", what);
+  T_RATIO(info.saddle.residual_rows, accuracy, "%s: residual", what);
+  T_RATIO(fmax(info.residual_max, info.gradient_residual_max), 20 * accuracy, "%s: largest residual", what);
+  T_RATIO(difference(ctx, c->n, exact, s), allowed * accuracy, "%s: from the dense solution", what);
+  T_RATIO(fabs(info.energy - energy) / energy, 100 * accuracy, "%s: energy", what);
+  batten_spline_free(exact);
+  batten_spline_free(s);
+}
+
+static void test_against_dense(batten_context *ctx) {
+  cloud c = make_cloud(3, 3500);
+  compare(ctx, "r", &c, false, 2, 0, NULL, 1e-6, 20);
+  compare(ctx, "r to 1e-9", &c, false, 2, 0, NULL, 1e-9, 20);
+  compare(ctx, "r, smoothing", &c, false, 2, 0.01, NULL, 1e-6, 20);
+  double *rho = malloc(c.count * sizeof *rho);
+  for (size_t i = 0; i < c.count; i++) rho[i] = i % 3 ? 0 : 0.02 * (double)(i % 7);
+  compare(ctx, "r, smoothing of some", &c, false, 2, 0, rho, 1e-6, 20);
+  free(rho);
+  free_cloud(&c);
+  c = make_sphere(3500);
+  compare(ctx, "r, bumpy sphere", &c, false, 2, 0, NULL, 1e-6, 20);
+  free_cloud(&c);
+  c = make_cloud(2, 3500);
+  compare(ctx, "r^2 ln r", &c, false, 2, 0, NULL, 1e-6, 20);
+  free_cloud(&c);
+  c = make_cloud(3, 3200);
+  compare(ctx, "r^3", &c, false, 3, 0, NULL, 1e-6, 20);
+  free_cloud(&c);
+  c = make_cloud(2, 700);
+  compare(ctx, "r^4 ln r, gradients", &c, true, 3, 0, NULL, 1e-6, 20);
+  free_cloud(&c);
+  c = make_cloud(3, 700);
+  compare(ctx, "r^3, gradients", &c, true, 3, 0, NULL, 1e-6, 20);
+  free_cloud(&c);
+}
+
+/* Points 1e-10 apart, swarms on a line, one far outlier. */
+static void test_uneven(batten_context *ctx) {
+  cloud c = make_cloud(3, 3300);
+  for (size_t i = 0; i < 150; i++)
+    for (unsigned a = 0; a < 3; a++) c.points[3 * i + a] = c.points[3 * (i + 150) + a] + (a == i % 3 ? 1e-10 : 0);
+  for (size_t i = 300; i < 600; i++) c.points[3 * i] = c.points[3 * i + 1] = 0.25;
+  for (unsigned a = 0; a < 3; a++) c.points[3 * 700 + a] = 40;
+  for (size_t i = 0; i < c.count; i++) c.values[i] = smooth(3, c.points + 3 * i, c.gradients);
+  compare(ctx, "clusters, a line, an outlier", &c, false, 2, 0, NULL, 1e-6, 50);
+  free_cloud(&c);
+}
+
+/* ---- invariances ---- */
+
+static bool same_bits(const batten_spline *a, const batten_spline *b) {
+  batten_spline_parts p = {.struct_size = sizeof p}, q = p;
+  if (!a || !b) return false;
+  batten_spline_get_parts(a, &p);
+  batten_spline_get_parts(b, &q);
+  return memcmp(p.coefficients, q.coefficients, p.count * sizeof(double)) == 0 &&
+         memcmp(p.polynomial, q.polynomial, p.polynomial_count * sizeof(double)) == 0;
+}
+
+static void test_invariance(batten_context *ctx) {
+  cloud c = make_cloud(3, 4500);
+  batten_spline_data d = data_of(&c, false);
+  batten_spline_options o = options_of(2, BATTEN_SADDLE_ITERATIVE, 1e-6);
+  batten_spline_info info = {0};
+  batten_spline *first = fit(ctx, &d, &o, &info), *other;
+  T_CHECK(info.saddle.levels > 1, "%u levels", info.saddle.levels);
+  T_RATIO(info.saddle.iterations, 8, "iterations to 1e-6");
+  other = fit(ctx, &d, &o, NULL);
+  T_CHECK(same_bits(first, other), "again: same bits");
+  batten_spline_free(other);
+  batten_context *many = t_context(NULL, NULL, 3), *one = t_context(NULL, NULL, 1);
+  other = fit(many, &d, &o, NULL);
+  T_CHECK(same_bits(first, other), "three threads: same bits");
+  batten_spline_free(other);
+  other = fit(one, &d, &o, NULL);
+  T_CHECK(same_bits(first, other), "one thread: same bits");
+  batten_spline_free(other);
+  batten_context_free(one);
+  batten_context_free(many);
+  for (size_t i = 0; i < 3 * c.count; i++) c.points[i] += 7e6;
+  other = fit(ctx, &d, &o, NULL);
+  T_CHECK(same_bits(first, other), "coordinates about 7e6: same bits");
+  batten_spline_free(other);
+  for (size_t i = 0; i < 3 * c.count; i++) c.points[i] = ldexp(c.points[i] - 7e6, -30);
+  other = fit(ctx, &d, &o, NULL);
+  T_CHECK(same_bits(first, other), "2^-30 times as large: same bits");
+  batten_spline_free(other);
+  batten_spline_free(first);
+  free_cloud(&c);
+}
+
+/* ---- choice of method, memory ---- */
+
+static void test_choice(batten_context *ctx) {
+  cloud c = make_sphere(13000);
+  batten_spline_data d = data_of(&c, false);
+  batten_spline_options o = options_of(2, BATTEN_SADDLE_AUTO, 1e-6);
+  batten_spline_info info = {0};
+  double start = batten_now();
+  batten_spline_free(fit(ctx, &d, &o, &info));
+  printf("# N = %zu: %.2f s\n", c.count, batten_now() - start);
+  T_CHECK(info.saddle.method == BATTEN_SADDLE_ITERATIVE && info.saddle.iterations <= 6, "13,000 points: %s, %u steps",
+          batten_saddle_method_name(info.saddle.method), info.saddle.iterations);
+  T_RATIO(info.saddle.residual_rows, 1e-6, "its residual");
+  d.count = 3000;
+  batten_spline_free(fit(ctx, &d, &o, &info));
+  T_CHECK(info.saddle.method == BATTEN_SADDLE_CHOLESKY_MIXED && info.residual_max <= 1e-10, "3,000 points: %s",
+          batten_saddle_method_name(info.saddle.method));
+  free_cloud(&c);
+}
+
+/* Prediction against what was taken. */
+static void test_bytes(batten_context *ctx) {
+  cloud c = make_sphere(6000);
+  batten_spline_data d = data_of(&c, false);
+  batten_spline_options o = options_of(2, BATTEN_SADDLE_ITERATIVE, 1e-6);
+  batten_bytes_peak_reset(ctx);
+  batten_spline_free(fit(ctx, &d, &o, NULL));
+  const double said = (double)batten_spline_bytes(BATTEN_SADDLE_ITERATIVE, 3, 2, c.count, 0);
+  T_RATIO((double)batten_bytes_peak(ctx), said, "bytes at the peak");
+  T_RATIO(said, 3 * (double)batten_bytes_peak(ctx), "bytes predicted");
+  T_CHECK(batten_spline_bytes(BATTEN_SADDLE_ITERATIVE, 3, 2, SIZE_MAX / 4, 0) == SIZE_MAX, "too many to count");
+  free_cloud(&c);
+}
+
+/* ---- bad input ---- */
+
+static batten_status try_fit(batten_context *ctx, const batten_spline_data *d, const batten_spline_options *o) {
+  batten_spline *s = NULL;
+  batten_status st = batten_spline_fit(ctx, d, o, &s, NULL);
+  if (st < 0 && s) T_CHECK(false, "out is untouched");
+  batten_spline_free(s);
+  return st;
+}
+
+static void test_bad(batten_context *ctx) {
+  cloud c = make_cloud(3, 4000);
+  batten_spline_data d = data_of(&c, false);
+  batten_spline_options o = options_of(2, BATTEN_SADDLE_ITERATIVE, 1e-6);
+  memcpy(c.points + 3 * 2900, c.points + 3 * 17, 3 * sizeof(double));
+  T_STATUS(try_fit(ctx, &d, &o), BATTEN_E_INVALID, ctx, "points[2900]: equals points[17]");
+  for (size_t i = 0; i < c.count; i++) c.points[3 * i + 2] = 0.25;
+  c.points[3 * 2900] = 2;
+  T_STATUS(try_fit(ctx, &d, &o), BATTEN_E_SINGULAR, ctx, "lie in a plane with normal");
+  for (size_t i = 0; i < c.count; i++) {
+    c.points[3 * i] = (double)i;
+    c.points[3 * i + 1] = 2 * (double)i;
+  }
+  T_STATUS(try_fit(ctx, &d, &o), BATTEN_E_SINGULAR, ctx, "lie on a line with direction");
+  d.n = 1;
+  T_STATUS(try_fit(ctx, &d, &o), BATTEN_E_INVALID, ctx, "opt.saddle.method: iterative with data.n = 1");
+  d.n = 3;
+  o.saddle.accuracy = 1e-20;
+  free_cloud(&c);
+  c = make_cloud(3, 100);
+  d = data_of(&c, false);
+  T_STATUS(try_fit(ctx, &d, &o), BATTEN_E_INVALID, ctx, "opt.accuracy: 1e-20");
+  o.saddle.accuracy = 1e-6;
+  d.count = 4; /* as many as monomials: nothing to iterate */
+  T_OK(try_fit(ctx, &d, &o), ctx);
+  d.count = 5;
+  T_OK(try_fit(ctx, &d, &o), ctx);
+  free_cloud(&c);
+}
+
+/* A residual that misses what was asked for is said. */
+static void test_missed(batten_context *ctx) {
+  cloud c = make_sphere(4500);
+  batten_spline_data d = data_of(&c, false);
+  batten_spline_options o = options_of(2, BATTEN_SADDLE_ITERATIVE, 1e-9);
+  o.saddle.iterations_max = 1;
+  T_STATUS(try_fit(ctx, &d, &o), BATTEN_W_ACCURACY, ctx, "above opt.saddle.accuracy = 1e-09");
+  free_cloud(&c);
+}
+
+static batten_status fit_small(batten_context *ctx, void *arg) {
+  const cloud *c = arg;
+  batten_spline_data d = data_of(c, true);
+  batten_spline_options o = options_of(3, BATTEN_SADDLE_ITERATIVE, 1e-6);
+  return try_fit(ctx, &d, &o);
+}
+
+int main(void) {
+  batten_context *ctx = t_context(NULL, NULL, 2);
+  test_against_dense(ctx);
+  test_uneven(ctx);
+  test_invariance(ctx);
+  test_choice(ctx);
+  test_bytes(ctx);
+  test_bad(ctx);
+  test_missed(ctx);
+  cloud small = make_cloud(2, 60);
+  t_fail_every_allocation("a fit by iteration", fit_small, &small);
+  t_cancel_every_progress("a fit by iteration", fit_small, &small);
+  free_cloud(&small);
+  T_CHECK(batten_bytes_in_use(ctx) == 0, "nothing is left");
+  batten_context_free(ctx);
+  return t_done();
+}
