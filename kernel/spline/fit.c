@@ -15,9 +15,9 @@
 /* Residuals above this part of the data's range are a warning. */
 static const double RESIDUAL_PROMISED = 1e-10;
 
-/* Residuals of a fit by iteration are looked at directly at all points where that takes no more than so many terms (some
- * tenths of a second), else at so many points as that allows, and at a thousand at least: fast sums would add an error
- * of their own, of the size of what is looked for. */
+/* Residuals of a fit by iteration are looked at directly at all points where that takes no more than so many terms
+ * (some tenths of a second), else at so many points as that allows, and at a thousand at least: fast sums would add
+ * an error of their own, of the size of what is looked for. */
 static const size_t RESIDUAL_TERMS = 1000000000, RESIDUAL_POINTS = 1000;
 
 typedef struct fit {
@@ -164,9 +164,9 @@ static batten_status fail_singular(const fit *t, const char *detail) {
       s->count, s->m - 1, s->m, detail);
 }
 
-/* From so many unknowns on iteration takes less time than the factors do, for the kernels that it takes easily: r, and
- * r^2 ln r in the plane (benchmarks/bench_large). Its residual is then what saddle.accuracy asks for, not rounding: the
- * limit is kept well above where the times meet. */
+/* From so many unknowns on iteration takes less time than the factors do, for the kernels that it takes easily: r,
+ * and r^2 ln r in the plane (benchmarks/bench_large). Its residual is then what saddle.accuracy asks for, not
+ * rounding: the limit is kept well above where the times meet. */
 enum { ITERATIVE_FROM = 12000 };
 
 /* Where no factor has room, iteration is tried from so many unknowns on, whatever the kernel. */
@@ -327,7 +327,8 @@ static batten_status check_values(fit *t, double *worst) {
   return BATTEN_OK;
 }
 
-/* The largest length of a miss of a gradient. w and f have room for N + n M numbers, and nobody needs them any more. */
+/* The largest length of a miss of a gradient. w and f have room for N + n M numbers, and nobody needs them any more.
+ */
 static batten_status check_gradients(fit *t, double *worst) {
   const batten_spline_data *d = t->data;
   const size_t n = d->n, count = d->gradient_count, checked = points_to_check(t, count);

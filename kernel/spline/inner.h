@@ -28,9 +28,9 @@ static inline double spline_to_box(double x, double origin, double scale) { retu
 
 /* What the iterative solver takes of a system beside its entries; see sums.c. */
 typedef struct spline_sums {
-  batten_saddle_sums calls; /* their user is the spline_system */
-  double *points;           /* [rows][n] in the unit box, of each unknown */
-  struct spline_plan *plans;       /* alive; they share operators */
+  batten_saddle_sums calls;  /* their user is the spline_system */
+  double *points;            /* [rows][n] in the unit box, of each unknown */
+  struct spline_plan *plans; /* alive; they share operators */
 } spline_sums;
 
 /* The system of a fit: unknowns 0 .. N-1 are the weights of the values, N + a M + q the weight of the

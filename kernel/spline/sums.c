@@ -2,12 +2,12 @@
  * sums, and entries in any order.
  *
  * An unknown is a weight, or one component of a gradient coefficient; several share a point. So the columns of a plan
- * become sources, each point once with a weight and a dipole, and the rows targets with a value and a gradient. `slot`
- * says where an unknown is among the numbers that <batten/fmm.h> takes or gives: values first, [points], then
+ * become sources, each point once with a weight and a dipole, and the rows targets with a value and a gradient.
+ * `slot` says where an unknown is among the numbers that <batten/fmm.h> takes or gives: values first, [points], then
  * gradients, [points][n].
  *
- * Operators of the multipole method depend on the kernel and the accuracy alone and can take seconds to make; plans of
- * one fit share those of the plans that are alive. */
+ * Operators of the multipole method depend on the kernel and the accuracy alone and can take seconds to make; plans
+ * of one fit share those of the plans that are alive. */
 #include "spline/inner.h"
 
 #include "base/checked.h"
@@ -37,7 +37,7 @@ typedef struct spline_plan {
   batten_context *ctx;
   spline_sums *owner;
   struct spline_plan *next; /* of those alive */
-  double sign;       /* of the kernel */
+  double sign;              /* of the kernel */
   double accuracy;
   role rows, cols;
   nugget *nuggets;
@@ -181,8 +181,9 @@ static batten_status apply(void *user, batten_context *ctx, const double *x, dou
   const size_t n = p->owner->calls.dimension;
   for (size_t i = 0; i < cols->points * (cols->gradients ? 1 + n : 1); i++) cols->numbers[i] = 0;
   for (size_t j = 0; j < cols->count; j++) cols->numbers[cols->slot[j]] = p->sign * x[j];
-  batten_status st = batten_fmm_apply(ctx, p->fmm, cols->numbers, cols->gradients ? cols->numbers + cols->points : NULL,
-                                      rows->numbers, rows->gradients ? rows->numbers + rows->points : NULL);
+  batten_status st =
+      batten_fmm_apply(ctx, p->fmm, cols->numbers, cols->gradients ? cols->numbers + cols->points : NULL,
+                       rows->numbers, rows->gradients ? rows->numbers + rows->points : NULL);
   if (st < 0) return st;
   for (size_t i = 0; i < rows->count; i++) y[i] = rows->numbers[rows->slot[i]];
   for (size_t q = 0; q < p->nugget_count; q++) y[p->nuggets[q].row] += p->nuggets[q].rho * x[p->nuggets[q].col];

@@ -36,7 +36,8 @@ static cloud make_sphere(size_t count) {
   cloud c = make_cloud(3, count);
   uint64_t seed = 5;
   for (size_t i = 0; i < count; i++) {
-    double *x = c.points + 3 * i, z = 2 * t_uniform(&seed) - 1, a = 8 * atan(1) * t_uniform(&seed), s = sqrt(1 - z * z);
+    double *x = c.points + 3 * i, z = 2 * t_uniform(&seed) - 1, a = 8 * atan(1) * t_uniform(&seed),
+           s = sqrt(1 - z * z);
     double radius = 1 + 0.1 * sin(5 * a) * s * s + 0.05 * cos(9 * z);
     x[0] = radius * s * cos(a), x[1] = radius * s * sin(a), x[2] = radius * z;
     c.values[i] = x[0] * x[0] + x[1] * x[1] + x[2] * x[2] - 1;
@@ -112,11 +113,13 @@ static void compare(batten_context *ctx, const char *what, const cloud *c, bool 
   o.loo_samples = 256;
   start = batten_now();
   batten_spline *s = fit(ctx, &d, &o, &info);
-  printf("# %s, N = %zu: %.2f s (dense %.2f), %u levels, %u iterations, products %.0e, residual %.1e (2-norm) %.1e "
-         "(largest)\n",
-         what, c->count, batten_now() - start, dense_s, info.saddle.levels, info.saddle.iterations,
-         info.saddle.products_accuracy, info.saddle.residual_rows, info.residual_max);
-  T_CHECK(info.saddle.method == BATTEN_SADDLE_ITERATIVE && info.residual_points == c->count, "%s: by iteration", what);
+  printf(
+      "# %s, N = %zu: %.2f s (dense %.2f), %u levels, %u iterations, products %.0e, residual %.1e (2-norm) %.1e "
+      "(largest)\n",
+      what, c->count, batten_now() - start, dense_s, info.saddle.levels, info.saddle.iterations,
+      info.saddle.products_accuracy, info.saddle.residual_rows, info.residual_max);
+  T_CHECK(info.saddle.method == BATTEN_SADDLE_ITERATIVE && info.residual_points == c->count, "%s: by iteration",
+          what);
   T_CHECK(isnan(info.loo_rms) && info.loo_samples == 0, "%s: no leave-one-out errors", what);
   T_RATIO(info.saddle.residual_rows, accuracy, "%s: residual", what);
   T_RATIO(fmax(info.residual_max, info.gradient_residual_max), 20 * accuracy, "%s: largest residual", what);

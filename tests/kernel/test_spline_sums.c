@@ -173,7 +173,8 @@ static void test_bytes(batten_context *ctx) {
     void *plan = NULL;
     batten_bytes_peak_reset(ctx);
     T_OK(calls->plan(&s.system, ctx, 1e-6, s.rows, NULL, s.rows, NULL, &plan), ctx);
-    T_RATIO((double)(batten_bytes_peak(ctx) - before), (double)said, "bytes of a plan%s", hermite ? ", gradients" : "");
+    T_RATIO((double)(batten_bytes_peak(ctx) - before), (double)said, "bytes of a plan%s",
+            hermite ? ", gradients" : "");
     if (plan) calls->release(plan);
     close_scene(&s);
   }

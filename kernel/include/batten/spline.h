@@ -41,9 +41,9 @@ typedef struct batten_spline_options {
   const double *smoothing_per_point; /* [N] >= 0 in place of smoothing; NULL = one for all */
   size_t loo_samples;      /* leave-one-out errors of so many points, evenly drawn; SIZE_MAX = all, 0 = none.
                               Default 256. */
-  batten_saddle_options saddle; /* method, refinement, tolerance. ITERATIVE is for n = 2 and 3 and makes its products by
-                              <batten/fmm.h>; AUTO chooses it for 12,000 unknowns N + nM and more with 2m - n <= 2
-                              (kernels r and r^2 ln r), and where no factor fits the context's memory limit. */
+  batten_saddle_options saddle; /* method, refinement, tolerance. ITERATIVE is for n = 2 and 3 and makes its products
+                                   by <batten/fmm.h>; AUTO chooses it from 12,000 unknowns N + nM on where 2m - n <= 2
+                                   (kernels r and r^2 ln r), and where no factor fits the memory limit. */
 } batten_spline_options;
 BATTEN_API batten_spline_options batten_spline_options_default(void);
 
@@ -52,11 +52,11 @@ typedef struct batten_spline_info {
   double residual_max;  /* max |U(x_i) - v_i| / (max v - min v), recomputed by the evaluator; with smoothing
                            against v_i - rho w_i. Where all v are equal: over the largest |gradient| times the
                            unit box's side, else over |v| */
-  size_t residual_points; /* at how many points it was looked for: all, or by ITERATIVE, where N (N + nM) is above 1e9,
-                             1e9 / (N + nM) evenly drawn ones, and 1000 at least; gradients likewise. Sums are direct */
+  size_t residual_points; /* at how many points it was looked for: all, or by ITERATIVE, where N (N + nM) is above
+                             1e9, 1e9 / (N + nM) evenly drawn ones, and 1000 at least; gradients likewise */
   double gradient_residual_max; /* the same for gradients, relative to the largest |gradient|; 0 without */
   double loo_rms;       /* root mean square of U_without_i(x_i) - v_i over the sample, unit of the values; NaN when
-                           not computed (loo_samples = 0, or N + nM = k, or by ITERATIVE, which has no factor) */
+                           not computed (loo_samples = 0, or N + nM = k, or ITERATIVE, which has no factor) */
   size_t loo_samples;   /* how many; points without which the polynomial part is undetermined are left out */
   double energy;        /* w' K w: the minimised energy up to its constant; unit box, values squared */
   double time_total_s;
@@ -68,8 +68,8 @@ BATTEN_API size_t batten_spline_bytes(batten_saddle_method method, unsigned n, u
 
 /* Fits; *out is freed by batten_spline_free and untouched on failure; info may be NULL.
  * Positive status: BATTEN_W_ACCURACY when residual_max or gradient_residual_max is above 1e-10; by ITERATIVE, when
- * saddle.residual_rows (a 2-norm, on direct rows) is above opt.saddle.accuracy, and the largest miss at a point, told by
- * residual_max, may be some times that.
+ * saddle.residual_rows (a 2-norm, on direct rows) is above opt.saddle.accuracy, and the largest miss at a point, told
+ * by residual_max, may be some times that.
  * Fails: INVALID (2m <= n, non-finite, equal points: names both, fewer conditions than monomials), TOO_LARGE, NOMEM,
  * SINGULAR (points on a line or plane: names it; or nearly on one another or on the zero set of a polynomial of
  * degree m-1), CANCELLED. Time O((N + nM)^3 / 3), by ITERATIVE about O(N + nM). */
