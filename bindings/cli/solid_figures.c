@@ -33,8 +33,8 @@ static void report_iteration(const solid_work *w, cli_report *r) {
   cli_report_number(r, "accuracy", used ? w->request->fit.spline.saddle.accuracy : NAN);
   cli_report_number(r, "residual_rows", used ? s->residual_rows : NAN);
   cli_report_number(r, "rows_checked", used ? (double)s->rows_checked : NAN);
-  cli_report_number(r, "iterations", used ? s->iterations : NAN);
-  cli_report_number(r, "levels", used ? s->levels : NAN);
+  cli_report_number(r, "iterations", used ? (double)s->iterations : NAN);
+  cli_report_number(r, "levels", used ? (double)s->levels : NAN);
   cli_report_number(r, "domains", used ? (double)s->domains : NAN);
   cli_report_number(r, "products_accuracy", used ? s->products_accuracy : NAN);
   cli_report_number(r, "time_setup_s", used ? s->time_setup_s : NAN);
