@@ -141,6 +141,13 @@ static void test_products(batten_context *ctx, unsigned n, unsigned m, size_t co
   close_scene(&s);
 }
 
+/* Enough points for the far field of sums in space with gradients. */
+static void test_gradients(batten_context *ctx) {
+  scene s = open_scene(ctx, 3, 3, 8000, true, false);
+  T_RATIO(product_error(&s, 1e-5, s.rows, NULL, s.rows, NULL), 1e-5, "n = 3, m = 3, N = 8000, gradients: K x");
+  close_scene(&s);
+}
+
 /* Plans that are alive share operators: the second one's bits do not depend on it, and any may go first. */
 static void test_sharing(batten_context *ctx) {
   scene s = open_scene(ctx, 3, 2, 6000, false, false);
@@ -191,7 +198,8 @@ int main(void) {
   test_products(ctx, 2, 2, 4000, false, false);
   test_products(ctx, 2, 3, 3000, true, false);
   test_products(ctx, 3, 2, 4000, false, true);
-  test_products(ctx, 3, 3, 3000, true, false);
+  test_products(ctx, 3, 3, 1500, true, false);
+  test_gradients(ctx);
   test_sharing(ctx);
   test_bytes(ctx);
   batten_context_free(ctx);
