@@ -30,12 +30,21 @@ static const char *carrier_name(const solid_work *w) {
 static void report_iteration(const solid_work *w, cli_report *r) {
   const batten_saddle_info *s = &w->info.spline.saddle;
   const bool used = s->method == BATTEN_SADDLE_ITERATIVE;
+  const struct {
+    const char *key;
+    size_t value;
+  } counts[] = {{"rows_checked", s->rows_checked},
+                {"iterations", s->iterations},
+                {"levels", s->levels},
+                {"domains", s->domains}};
   cli_report_number(r, "accuracy", used ? w->request->fit.spline.saddle.accuracy : NAN);
   cli_report_number(r, "residual_rows", used ? s->residual_rows : NAN);
-  cli_report_number(r, "rows_checked", used ? (double)s->rows_checked : NAN);
-  cli_report_number(r, "iterations", used ? (double)s->iterations : NAN);
-  cli_report_number(r, "levels", used ? (double)s->levels : NAN);
-  cli_report_number(r, "domains", used ? (double)s->domains : NAN);
+  for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
+    if (used)
+      cli_report_count(r, counts[i].key, counts[i].value);
+    else
+      cli_report_null(r, counts[i].key);
+  }
   cli_report_number(r, "products_accuracy", used ? s->products_accuracy : NAN);
   cli_report_number(r, "time_setup_s", used ? s->time_setup_s : NAN);
 }

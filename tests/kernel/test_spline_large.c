@@ -223,6 +223,90 @@ static void test_invariance(batten_context *ctx) {
   free_cloud(&c);
 }
 
+/* ---- many places ---- */
+
+static batten_spline_parts parts_of(const cloud *c, unsigned m, bool hermite, const size_t *at, const double *poly) {
+  const size_t count[4][5] = {{0}, {0}, {0, 1, 3, 6, 10}, {0, 1, 4, 10, 20}};
+  return (batten_spline_parts){.struct_size = sizeof(batten_spline_parts),
+                               .n = c->n,
+                               .m = m,
+                               .count = c->count,
+                               .centers = c->points,
+                               .coefficients = c->values,
+                               .gradient_count = hermite ? c->count / 2 : 0,
+                               .gradient_at = at,
+                               .gradient_coefficients = c->gradients,
+                               .polynomial_count = count[c->n][m],
+                               .polynomial = poly,
+                               .origin = {0.5, 0.5, 0.5},
+                               .scale = 2};
+}
+
+/* Values and gradients against batten_spline_evaluate, centres among the places; errors over the largest. */
+static void test_evaluator(batten_context *ctx, unsigned n, unsigned m, bool hermite, double accuracy) {
+  enum { MORE = 2000 };
+  cloud c = make_cloud(n, 6000), places = make_cloud(n, 5000 + MORE);
+  const double poly[20] = {0.3, 1, -2, 0.5};
+  size_t *at = malloc(c.count * sizeof *at);
+  for (size_t q = 0; q < c.count / 2; q++) at[q] = 2 * q + 1;
+  memcpy(places.points, c.points, 5000 * n * sizeof(double));
+  batten_spline_parts parts = parts_of(&c, m, hermite, at, poly);
+  batten_spline *s = NULL;
+  batten_spline_evaluator *e = NULL;
+  T_OK(batten_spline_create(ctx, &parts, &s), ctx);
+  T_OK(batten_spline_evaluator_new(ctx, s, accuracy, &e), ctx);
+  batten_spline_free(s); /* it lives on */
+  const size_t count = places.count;
+  double *u = malloc(count * (2 + 2 * n) * sizeof *u), *v = u + count, *du = v + count, *dv = du + count * n;
+  double error = NAN, worst = 0, largest = 0, slope = 0, steepest = 0;
+  batten_spline_evaluate(ctx, s, count, places.points, v, dv, NULL);
+  for (int batch = 0; batch < 2; batch++) { /* the second has the operators of the first */
+    T_OK(batten_spline_evaluator_evaluate(ctx, e, count, places.points, u, du, &error), ctx);
+    for (size_t i = 0; i < count; i++) {
+      worst = fmax(worst, fabs(u[i] - v[i]));
+      largest = fmax(largest, fabs(v[i]));
+    }
+    for (size_t i = 0; i < count * n; i++) {
+      slope = fmax(slope, fabs(du[i] - dv[i]));
+      steepest = fmax(steepest, fabs(dv[i]));
+    }
+    T_RATIO(worst / largest, 20 * accuracy, "n = %u, m = %u%s: values at %zu places", n, m,
+            hermite ? ", gradients" : "", count);
+    T_RATIO(slope / steepest, 20 * accuracy, "gradients");
+    T_CHECK(error <= worst, "the error that is told, %.2g, is one of them, %.2g", error, worst);
+  }
+  T_OK(batten_spline_evaluator_evaluate(ctx, e, count, places.points, v, NULL, NULL), ctx);
+  T_OK(batten_spline_evaluator_evaluate(ctx, e, 0, NULL, NULL, NULL, &error), ctx);
+  T_CHECK(error == 0, "no places, no error");
+  const double before = u[0];
+  places.points[1] = NAN;
+  T_STATUS(batten_spline_evaluator_evaluate(ctx, e, count, places.points, u, NULL, NULL), BATTEN_E_INVALID, ctx,
+           "points[0][1]");
+  T_CHECK(u[0] == before, "outputs are untouched");
+  batten_spline_evaluator_free(e);
+  free(u);
+  free(at);
+  free_cloud(&c);
+  free_cloud(&places);
+}
+
+static batten_status evaluate_small(batten_context *ctx, void *arg) {
+  const cloud *c = arg;
+  const double poly[20] = {1};
+  size_t at[30];
+  double u[60], error;
+  for (size_t q = 0; q < 30; q++) at[q] = q;
+  batten_spline_parts parts = parts_of(c, 3, true, at, poly);
+  batten_spline *s = NULL;
+  batten_spline_evaluator *e = NULL;
+  batten_status st = batten_spline_create(ctx, &parts, &s);
+  if (st >= 0) st = batten_spline_evaluator_new(ctx, s, 1e-6, &e);
+  if (st >= 0) st = batten_spline_evaluator_evaluate(ctx, e, 60, c->points, u, NULL, &error);
+  batten_spline_evaluator_free(e);
+  batten_spline_free(s);
+  return st;
+}
+
 /* ---- choice of method, memory ---- */
 
 static void test_choice(batten_context *ctx) {
@@ -290,6 +374,8 @@ static void test_bad(batten_context *ctx) {
   c = make_cloud(3, 100);
   d = data_of(&c, false);
   T_STATUS(try_fit(ctx, &d, &o), BATTEN_E_INVALID, ctx, "opt.accuracy: 1e-20");
+  T_STATUS(batten_spline_evaluator_new(ctx, NULL, 1e-6, NULL), BATTEN_E_INVALID, ctx, "s: NULL");
+  T_STATUS(batten_spline_evaluator_evaluate(ctx, NULL, 0, NULL, NULL, NULL, NULL), BATTEN_E_INVALID, ctx, "e: NULL");
   o.saddle.accuracy = 1e-6;
   d.count = 4; /* as many as monomials: nothing to iterate */
   T_OK(try_fit(ctx, &d, &o), ctx);
@@ -320,6 +406,9 @@ int main(void) {
   test_against_dense(ctx);
   test_uneven(ctx);
   test_invariance(ctx);
+  test_evaluator(ctx, 3, 2, false, 1e-6);
+  test_evaluator(ctx, 2, 2, false, 1e-8);
+  test_evaluator(ctx, 3, 3, true, 1e-6);
   test_choice(ctx);
   test_bytes(ctx);
   test_bad(ctx);
@@ -327,6 +416,7 @@ int main(void) {
   cloud small = make_cloud(2, 60);
   t_fail_every_allocation("a fit by iteration", fit_small, &small);
   t_cancel_every_progress("a fit by iteration", fit_small, &small);
+  t_fail_every_allocation("an evaluator", evaluate_small, &small);
   free_cloud(&small);
   T_CHECK(batten_bytes_in_use(ctx) == 0, "nothing is left");
   batten_context_free(ctx);

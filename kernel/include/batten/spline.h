@@ -107,6 +107,27 @@ BATTEN_API batten_status batten_spline_evaluate(batten_context *ctx, const batte
                                                 const double *points, double *values, double *gradients,
                                                 double *hessians);
 
+/* Values and gradients at many points by <batten/fmm.h>, in time O(N + count) for a batch: worth it from some thousand
+ * centres and points on. The sum over the centres is approximated; its rounding is not that of batten_spline_evaluate(),
+ * and depends on the batch. */
+typedef struct batten_spline_evaluator batten_spline_evaluator;
+
+/* accuracy: 1e-12 .. 1e-3, of a batch's sums over the centres (2-norm, without the polynomial, which they may largely
+ * cancel). n = 2 or 3. The spline is retained. Fails: INVALID, NOMEM. */
+BATTEN_API batten_status batten_spline_evaluator_new(batten_context *ctx, batten_spline *s, double accuracy,
+                                                     batten_spline_evaluator **out);
+
+/* points [count][n] (finite); values [count], gradients [count][n]; each may be NULL, gradients take about four times
+ * as long. *value_error (may be NULL; unit of the values): the largest difference to batten_spline_evaluate() at up to
+ * 100 of the points, evenly drawn. The first batch makes operators for a second or so. One batch at a time; ctx is the
+ * one that e was made with. Same bits for any number of threads. Outputs are untouched on failure. Fails: INVALID,
+ * TOO_LARGE, NOMEM, CANCELLED. */
+BATTEN_API batten_status batten_spline_evaluator_evaluate(batten_context *ctx, batten_spline_evaluator *e, size_t count,
+                                                          const double *points, double *values, double *gradients,
+                                                          double *value_error);
+/* NULL is fine. */
+BATTEN_API void batten_spline_evaluator_free(batten_spline_evaluator *e);
+
 /* Bounds of U over boxes, as batten_field says: boxes [count][2][n], ranges [count][2]. Far centres are taken together
  * (their sum is expanded about the middle of the box), near ones by themselves: ranges narrow with the boxes. */
 BATTEN_API batten_status batten_spline_bounds(batten_context *ctx, const batten_spline *s, size_t count,
