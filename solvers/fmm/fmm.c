@@ -16,8 +16,8 @@ static const double DIRECT_TERMS = 4e6;
 
 /* Points of a leaf: as many as make direct sums cost about what the translations do. */
 static size_t leaf_points(unsigned n, unsigned order) {
-  if (n == 2) return 8 * (size_t)order;
-  return order <= 6 ? 96 : order <= 9 ? 160 : 256;
+  if (n == 2) return 6 * (size_t)order;
+  return order <= 6 ? 128 : order <= 8 ? 224 : 384;
 }
 
 /* Whether terms summed directly cost less than what is left of them and the far fields. In units of a term of near.c
