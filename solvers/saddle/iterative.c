@@ -34,8 +34,12 @@ static double first_accuracy(const batten_saddle_options *o) {
   return o->smooth_kernel ? fmin(wanted, WITHIN_SMOOTH) : wanted;
 }
 
+/* Where it is not much coarser than what the iteration itself takes, the same: plans may share what is dear to make.
+ */
 static double accuracy_within(const batten_saddle_options *o, size_t n) {
-  return o->smooth_kernel ? WITHIN_SMOOTH : n > LARGE ? WITHIN_LARGE : WITHIN_SMALL;
+  double wanted = o->smooth_kernel ? WITHIN_SMOOTH : n > LARGE ? WITHIN_LARGE : WITHIN_SMALL;
+  double first = first_accuracy(o);
+  return first <= wanted && first >= 0.1 * wanted ? first : wanted;
 }
 
 /* ---- Memory ---- */
@@ -50,9 +54,9 @@ static size_t plan_bytes(const batten_saddle_matrix *m, double accuracy, size_t 
   return m && m->sums && m->sums->bytes ? m->sums->bytes(m->user, accuracy, rows, cols) : 0;
 }
 
-/* Vectors of a solve: f less its polynomial, w, r, and where the next one begins; then those of the iteration. */
+/* Vectors of a solve: f, f less its polynomial, w, r, and where the next one begins; then those of the iteration. */
 static size_t vectors(batten_saddle_krylov krylov) {
-  return 4 + (krylov == BATTEN_SADDLE_CG ? 3 : 2 * STEPS_EXPECTED);
+  return 5 + (krylov == BATTEN_SADDLE_CG ? 3 : 2 * STEPS_EXPECTED);
 }
 
 /* m: for its sums, NULL: they take nothing. */
@@ -190,6 +194,16 @@ done:
   return st;
 }
 
+/* Plans that an earlier solve could not make anew. */
+static batten_status complete_plans(batten_saddle *s, saddle_iterative *it) {
+  batten_status st = BATTEN_OK;
+  bool links = true;
+  for (size_t q = 0; q + 1 < it->level_count; q++) links = links && it->levels[q].plan;
+  if (!links) st = batten_saddle_links_new(s, it, it->accuracy_within);
+  if (st == BATTEN_OK && s->matrix.n > 0 && !it->plan) st = plan_products(s, it, it->accuracy);
+  return st;
+}
+
 /* ---- Direct rows ---- */
 
 typedef struct rows {
@@ -273,12 +287,12 @@ done:
 typedef struct solve {
   batten_saddle *s;
   saddle_iterative *it;
-  const double *f;
-  double *pf, *w, *r; /* [N] Pi f, weights, Pi (f - K w) */
-  double *c;          /* [k] */
-  double norm;        /* |Pi f| */
-  double within;      /* |r| / norm, by the products */
-  double rows;        /* the same by direct rows: what counts */
+  double unit;            /* a power of two: f is the caller's times that, of size 1 */
+  double *f, *pf, *w, *r; /* [N] f, Pi f, weights, Pi (f - K w) */
+  double *c;              /* [k] */
+  double norm;            /* |Pi f| */
+  double within;          /* |r| / norm, by the products */
+  double rows;            /* the same by direct rows: what counts */
 } solve;
 
 /* c from the coefficients Q'(f - K w). */
@@ -312,7 +326,7 @@ static batten_status renew(solve *v) {
 static batten_status begin(solve *v) {
   size_t n = v->s->matrix.n;
   if (v->s->begin) {
-    memcpy(v->w, v->s->begin, n * sizeof *v->w);
+    for (size_t i = 0; i < n; i++) v->w[i] = v->unit * v->s->begin[i];
     batten_saddle_project(v->s, v->it, &v->it->levels[0], v->w, v->it->coefficients);
     batten_status st = renew(v);
     if (st < 0 || v->within < 1) return st;
@@ -356,7 +370,10 @@ static batten_status iterate(solve *v) {
     st = renew(v);
     if (st < 0) return st;
     st = check_rows(s, v->f, v->w, v->c, v->norm, &v->rows);
-    if (st < 0 || v->rows <= s->options.accuracy || left == 0) return st;
+    if (st < 0) return st;
+    if (!(v->rows <= DBL_MAX))
+      return batten_fail(s->ctx, BATTEN_E_INVALID, "matrix.sums: products or entries are not finite");
+    if (v->rows <= s->options.accuracy || left == 0) return BATTEN_OK;
     /* Twice in vain: it is rounding, or the problem. */
     bool gained = v->rows <= 0.5 * last;
     if (!gained && end != SADDLE_SHORT && last < INFINITY) return BATTEN_OK;
@@ -369,47 +386,54 @@ static batten_status iterate(solve *v) {
   return st;
 }
 
-/* The weights for the next solve to begin at. */
-static batten_status keep(batten_saddle *s, const double *w) {
-  if (!s->begin) s->begin = batten_alloc_array(s->ctx, s->matrix.n, sizeof *s->begin);
+/* The caller's w and c, and w for the next solve to begin at. */
+static batten_status give(const solve *v, double *w, double *c) {
+  batten_saddle *s = v->s;
+  size_t n = s->matrix.n;
+  if (!s->begin) s->begin = batten_alloc_array(s->ctx, n, sizeof *s->begin);
   if (!s->begin) return BATTEN_E_NOMEM;
-  memcpy(s->begin, w, s->matrix.n * sizeof *w);
+  for (size_t i = 0; i < n; i++) s->begin[i] = v->w[i] / v->unit;
+  if (n > 0) memcpy(w, s->begin, n * sizeof *w);
+  for (size_t q = 0; q < s->matrix.k; q++) c[q] = v->c[q] / v->unit;
   return BATTEN_OK;
 }
 
 batten_status batten_saddle_iterative_solve(batten_saddle *s, const double *f, double *w, double *c) {
   size_t n = s->matrix.n, k = s->matrix.k;
   saddle_iterative *it = s->iterative;
-  solve v = {.s = s, .it = it, .f = f};
-  batten_status st = BATTEN_E_NOMEM;
+  solve v = {.s = s, .it = it, .unit = 1};
+  double largest = 0;
+  batten_status st = complete_plans(s, it);
+  if (st < 0) return st;
+  st = BATTEN_E_NOMEM;
   v.c = batten_alloc_array(s->ctx, k, sizeof *v.c);
   if (!v.c) goto done;
-  v.pf = batten_alloc_array(s->ctx, n, 3 * sizeof *v.pf);
-  if (!v.pf) goto done;
+  v.f = batten_alloc_array(s->ctx, n, 4 * sizeof *v.f);
+  if (!v.f) goto done;
+  v.pf = v.f + n;
   v.w = v.pf + n;
   v.r = v.w + n;
-  if (n > 0) memcpy(v.pf, f, n * sizeof *f);
+  for (size_t i = 0; i < n; i++) largest = fmax(largest, fabs(f[i]));
+  if (largest > 0) v.unit = batten_unit(largest);
+  for (size_t i = 0; i < n; i++) v.f[i] = v.pf[i] = v.unit * f[i];
   batten_saddle_project(s, it, &it->levels[0], v.pf, it->coefficients);
   polynomial(&v, it->coefficients);
   v.norm = batten_saddle_norm(s, it, n, v.pf);
   s->info.iterations = 0;
   s->info.residual_rows = 0;
   s->info.rows_checked = 0;
+  st = BATTEN_OK;
   /* A polynomial to rounding: no weights. */
-  if (v.norm <= 64 * DBL_EPSILON * batten_saddle_norm(s, it, n, f)) {
+  if (v.norm <= 64 * DBL_EPSILON * batten_saddle_norm(s, it, n, v.f)) {
     memset(v.w, 0, n * sizeof *v.w);
-    st = BATTEN_OK;
   } else {
     st = iterate(&v);
-    if (st < 0) goto done;
     s->info.residual_rows = v.rows;
   }
   s->info.residual = s->info.residual_rows;
   s->info.products_accuracy = it->accuracy;
-  st = keep(s, v.w);
+  if (st == BATTEN_OK) st = give(&v, w, c);
   if (st < 0) goto done;
-  if (n > 0) memcpy(w, v.w, n * sizeof *w);
-  if (k > 0) memcpy(c, v.c, k * sizeof *c);
   if (!(s->info.residual_rows <= s->options.accuracy))
     st = batten_fail(s->ctx, BATTEN_W_ACCURACY,
                      "residual: %.3g on %zu rows after %u iterations, above opt.accuracy %.3g; %s",
@@ -417,7 +441,7 @@ batten_status batten_saddle_iterative_solve(batten_saddle *s, const double *f, d
                      s->info.iterations >= s->options.iterations_max ? "raise opt.iterations_max"
                                                                      : "add a nugget, or raise opt.overlap");
 done:
-  batten_free(s->ctx, v.pf);
+  batten_free(s->ctx, v.f);
   batten_free(s->ctx, v.c);
   return st;
 }

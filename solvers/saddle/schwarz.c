@@ -67,6 +67,7 @@ void batten_saddle_links_free(saddle_iterative *it) {
 
 batten_status batten_saddle_links_new(batten_saddle *s, saddle_iterative *it, double accuracy) {
   batten_saddle_links_free(it);
+  it->accuracy_within = accuracy;
   for (size_t q = 0; q + 1 < it->level_count; q++) {
     saddle_level *fine = &it->levels[q];
     const saddle_level *coarse = fine + 1, *to = it->fine_first ? coarse : fine,
@@ -76,7 +77,6 @@ batten_status batten_saddle_links_new(batten_saddle *s, saddle_iterative *it, do
     st = it->sums.plan(s->matrix.user, s->ctx, accuracy, to->count, to->index, from->count, from->index, &fine->plan);
     if (st < 0) return st;
   }
-  it->accuracy_within = accuracy;
   return BATTEN_OK;
 }
 

@@ -246,6 +246,16 @@ static void test_starts(batten_context *ctx) {
   T_OK(batten_saddle_solve(ctx, h, f, w, c), ctx);
   T_RATIO(fmax(fmax(fabs(c[0] - 3), fabs(c[1] + 1)), fmax(fabs(c[2] - 2), fabs(c[3]))), 1e-12, "a linear f: c");
   T_CHECK(w[0] == 0 && w[N - 1] == 0 && batten_saddle_get_info(h).iterations == 0, "a linear f: no weights");
+  /* Powers of two: the same bits, huge or tiny. */
+  double *huge = malloc(2 * N * sizeof *huge), *tiny = huge + N;
+  for (size_t i = 0; i < N; i++) f[i] = ldexp(s.f[i], 1000);
+  T_OK(batten_saddle_begin_at(ctx, h, NULL), ctx);
+  T_OK(batten_saddle_solve(ctx, h, f, huge, c), ctx);
+  for (size_t i = 0; i < N; i++) f[i] = ldexp(s.f[i], -900), huge[i] = ldexp(huge[i], -1900);
+  T_OK(batten_saddle_begin_at(ctx, h, NULL), ctx);
+  T_OK(batten_saddle_solve(ctx, h, f, tiny, c), ctx);
+  T_CHECK(!memcmp(huge, tiny, N * sizeof *huge), "f times powers of two: the same bits");
+  free(huge);
   memset(f, 0, N * sizeof *f);
   T_OK(batten_saddle_solve(ctx, h, f, w, c), ctx);
   T_CHECK(w[7] == 0 && c[0] == 0, "f = 0");

@@ -182,12 +182,37 @@ static void test_callbacks(batten_context *ctx, scene *s) {
       st = batten_saddle_factor(ctx, &m, &o, &h);
       if (st == BATTEN_OK) st = batten_saddle_solve(ctx, h, s->f, w, c);
       ok = st >= 0 || (w[3] == 7 && c[0] == 7 && strstr(batten_error(ctx), "fails"));
+      if (h && st < 0) ok = ok && batten_saddle_solve(ctx, h, s->f, w, c) == BATTEN_OK; /* it stays usable */
       batten_saddle_free(h);
       ok = ok && d.live == 0 && batten_bytes_in_use(ctx) == 0;
     }
     T_CHECK(ok && st >= 0 && k > 3, "each of %zu calls of %s fails once: %s", k - 1, kind ? "apply" : "plan",
             batten_status_name(st));
   }
+  free(w);
+}
+
+static batten_status apply_nan(void *plan, batten_context *ctx, const double *x, double *y) {
+  batten_status st = direct_apply(plan, ctx, x, y);
+  y[0] = NAN;
+  return st;
+}
+
+static void test_nan(batten_context *ctx, scene *s) {
+  double *w = calloc(s->n, sizeof *w), c[4];
+  direct d = {0};
+  batten_saddle_sums sums = direct_sums(s, &d);
+  batten_saddle_matrix m = scene_matrix(s);
+  batten_saddle_options o = iterative_options(1e-3);
+  batten_saddle *h = NULL;
+  sums.apply = apply_nan;
+  m.sums = &sums;
+  T_OK(batten_saddle_factor(ctx, &m, &o, &h), ctx);
+  T_STATUS(batten_saddle_solve(ctx, h, s->f, w, c), BATTEN_E_INVALID, ctx, "products or entries are not finite");
+  s->f[9] = INFINITY;
+  T_STATUS(batten_saddle_solve(ctx, h, s->f, w, c), BATTEN_E_INVALID, ctx, "f[9]: inf is not finite");
+  s->f[9] = 0;
+  batten_saddle_free(h);
   free(w);
 }
 
@@ -199,6 +224,7 @@ int main(void) {
   test_memory();
   test_limit();
   test_callbacks(ctx, &s);
+  test_nan(ctx, &s);
   t_cancel_every_progress("factor and solve", run, &gmres);
   t_cancel_every_progress("factor and solve by conjugate gradients", run, &cg);
   t_fail_every_allocation("factor and solve", run, &gmres);
