@@ -94,8 +94,8 @@ static bool can_part(unsigned n, const fmm_cell *c) {
 }
 
 static bool is_one_point(const builder *b, const fmm_cell *c) {
-  const size_t targets = b->tree->same ? 0 : c->t1 - c->t0;
-  return all_equal(b->n, b->sources + c->s0, c->s1 - c->s0, b->targets + c->t0, targets);
+  if (b->tree->same) return all_equal(b->n, b->sources + c->s0, c->s1 - c->s0, b->sources, 0);
+  return all_equal(b->n, b->sources + c->s0, c->s1 - c->s0, b->targets + c->t0, c->t1 - c->t0);
 }
 
 static bool is_to_be_cut(const builder *b, const fmm_cell *c) {
