@@ -92,7 +92,7 @@ run 1 "none.ply" inspect none.ply
 printf 'hello\n' >hello.bin
 run 1 "hello.bin" inspect hello.bin
 awk 'BEGIN { srand(1); for (i = 0; i < 150000; i++) print rand(), rand(), rand() }' >many.xyz
-run 1 "allowed are" solid many.xyz --memory 9G # a matrix of 45 GB: refused by its size
+run 1 "allowed are" solid many.xyz --memory 9G --method mixed # a matrix of 45 GB: refused by its size
 check "and the text is in the words of the program" grep -q 'many.xyz: 150000 rows .*; raise --memory' err
 rm -f broken.xyz flat.xyz hello.bin many.xyz
 nothing_new "after all failures"
@@ -173,6 +173,11 @@ run 0 "" solid s.csv --report u.json --quiet --method ldl --order 3 --smoothing 
 is u.json method ldl
 holds u.json order 'x == 3'
 holds u.json smoothing 'x == 1e-6'
+run 0 "" solid s.csv --report u.json --quiet --method iterative --accuracy 1e-8 --cell 0.4
+is u.json method iterative
+holds u.json accuracy 'x == 1e-8'
+holds u.json residual_rows 'x <= 1e-8'
+holds u.json iterations 'x >= 1'
 run 0 "warning: the surface reaches its box and is cut there; enlarge --box" solid s.csv --report u.json --quiet --box 1,-8,-2,6,-2,1.5
 is u.json status clipped
 is u.json mesh_closed False
