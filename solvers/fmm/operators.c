@@ -23,11 +23,11 @@
 
 /* ---- sizes ---- */
 
-/* The 2-norm of the error was measured at 20 to 500 cuts for r in space, by how much the sums cancel and where the
- * points lie in their cells, and three times that for kernels that grow faster and where derivatives come in. An
+/* The 2-norm of the error was measured at 20 to 1000 cuts for r in space, by how much the sums cancel and where the
+ * points lie in their cells, and somewhat more for kernels that grow faster and where derivatives come in. An
  * order one below -log10 cut interpolates well enough for that. Below FLOOR, singular values are rounding errors. */
 fmm_orders batten_fmm_orders(const batten_radial *kernel, double accuracy, bool derivatives) {
-  const double FLOOR = 3e-15, wanted = accuracy / (derivatives || kernel->power > 1 ? 800 : 300);
+  const double FLOOR = 3e-15, wanted = accuracy / (derivatives || kernel->power > 1 ? 1500 : 1000);
   const double cut = wanted > FLOOR ? wanted : FLOOR;
   unsigned order = (unsigned)ceil(-log10(cut) - 1);
   if (order > FMM_ORDER_MAX) order = FMM_ORDER_MAX;
