@@ -125,8 +125,10 @@ void solid_summary(const solid_work *w) {
   const batten_solid_info *i = &w->info;
   cli_line("points", "%zu used of %zu read%s", i->points_used, i->points_given,
            w->cloud.normals ? ", with normals" : "");
-  cli_line("solid", "carrier %s, solver %s, residual %.1e, leave-one-out %.2e", carrier_name(w),
-           batten_saddle_method_name(i->spline.saddle.method), i->residual_max, i->spline.loo_rms);
+  char loo[40] = ""; /* not with every method */
+  if (!isnan(i->spline.loo_rms)) snprintf(loo, sizeof loo, ", leave-one-out %.2e", i->spline.loo_rms);
+  cli_line("solid", "carrier %s, solver %s, residual %.1e%s", carrier_name(w),
+           batten_saddle_method_name(i->spline.saddle.method), i->residual_max, loo);
   cli_line("sign", "%s%s%s", sign_name(i->sign), i->orientation == BATTEN_ORIENTATION_NONE ? "" : ", orientation ",
            i->orientation == BATTEN_ORIENTATION_NONE ? "" : orientation_name(i->orientation));
   body_print(&w->body);
