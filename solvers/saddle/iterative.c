@@ -145,6 +145,8 @@ static batten_status plan_products(batten_saddle *s, saddle_iterative *it, doubl
 static void count_domains(batten_saddle *s, const saddle_iterative *it, size_t before) {
   s->info.levels = (unsigned)it->level_count;
   s->info.domains = s->info.domains_double = 0;
+  const size_t told = sizeof s->info.level_sizes / sizeof *s->info.level_sizes;
+  for (size_t q = 0; q < told; q++) s->info.level_sizes[q] = q < it->level_count ? it->levels[q].count : 0;
   for (size_t q = 0; q < it->level_count; q++)
     for (size_t d = 0; d < it->levels[q].domain_count; d++) {
       s->info.domains++;
@@ -420,6 +422,7 @@ batten_status batten_saddle_iterative_solve(batten_saddle *s, const double *f, d
   polynomial(&v, it->coefficients);
   v.norm = batten_saddle_norm(s, it, n, v.pf);
   s->info.iterations = 0;
+  memset(s->info.iterations_to, 0, sizeof s->info.iterations_to);
   s->info.residual_rows = 0;
   s->info.rows_checked = 0;
   st = BATTEN_OK;

@@ -101,6 +101,14 @@ static double fraction_of(double norm, double residual, double target) {
   return all > 0 && gone > 0 ? fmin(gone / all, 1) : 0;
 }
 
+/* Tells when the residual, over norm, comes below marks for the first time; the step is not counted down yet. */
+static void note_marks(batten_saddle *s, unsigned left, double within) {
+  static const double MARK[] = {1e-3, 1e-6, 1e-9};
+  for (size_t q = 0; q < sizeof MARK / sizeof *MARK; q++)
+    if (within <= MARK[q] && s->info.iterations_to[q] == 0)
+      s->info.iterations_to[q] = s->options.iterations_max - left + 1;
+}
+
 /* ---- When to give up ---- */
 
 /* Steps in which the residual must fall to half. Where it does not, the products are not good enough. */
@@ -249,6 +257,7 @@ batten_status batten_saddle_fgmres(batten_saddle *s, saddle_iterative *it, doubl
     b.v[j + 1] = now->v;
     last = rotate(&b, j, &g[j], last);
     residual = fabs(last);
+    note_marks(s, *left, residual / norm);
     *end = SADDLE_MET;
     if (residual > target && stalled(&calm, residual)) {
       *end = SADDLE_STALLED;
@@ -305,6 +314,7 @@ batten_status batten_saddle_cg(batten_saddle *s, saddle_iterative *it, double *w
       r[i] -= alpha * q[i];
     }
     residual = batten_saddle_norm(s, it, n, r);
+    note_marks(s, *left, residual / norm);
     if (residual > target && stalled(&calm, residual)) {
       (*left)--;
       break;

@@ -86,6 +86,33 @@ static void test_counts(batten_context *ctx, size_t n, unsigned allowed) {
   scene_free(&s);
 }
 
+/* What is told of the way: each mark is where an iteration that is asked for no more ends. */
+static void test_marks(batten_context *ctx, batten_saddle_krylov krylov) {
+  enum { N = 5000 };
+  scene s = bumpy_sphere(KERNEL_R, N, 3);
+  answer a = answer_new(N), part = answer_new(N);
+  direct d = {0};
+  batten_saddle_options o = iterative_options(2e-9);
+  o.krylov = krylov;
+  solve(ctx, &s, &d, &o, &a);
+  const unsigned *to = a.info.iterations_to;
+  T_CHECK(0 < to[0] && to[0] < to[1] && to[1] < to[2] && to[2] == a.info.iterations,
+          "1e-3, 1e-6, 1e-9 after %u, %u, %u of %u iterations", to[0], to[1], to[2], a.info.iterations);
+  const size_t *size = a.info.level_sizes;
+  T_CHECK(a.info.levels == 2 && size[0] == N && 0 < size[1] && size[1] < N / 4 && size[2] == 0 && size[7] == 0,
+          "levels of %zu, %zu", size[0], size[1]);
+  for (int q = 0; q < 2; q++) {
+    o.accuracy = q ? 2e-6 : 2e-3;
+    o.products_accuracy = a.info.products_accuracy;
+    solve(ctx, &s, &d, &o, &part);
+    T_CHECK(part.info.iterations == to[q] && part.info.iterations_to[q] == to[q] && part.info.iterations_to[2] == 0,
+            "asked for %g: %u iterations", 0.5 * o.accuracy, part.info.iterations);
+  }
+  free(a.w);
+  free(part.w);
+  scene_free(&s);
+}
+
 /* ---- Against dense solutions ---- */
 
 /* Values of the spline at random points between the data. */
@@ -325,6 +352,8 @@ int main(int argc, char **argv) {
     test_panels();
     test_by_hand(ctx);
     test_counts(ctx, 10000, 8);
+    test_marks(ctx, BATTEN_SADDLE_FGMRES);
+    test_marks(ctx, BATTEN_SADDLE_CG);
     test_exactness(ctx);
     test_products(ctx);
     test_starts(ctx);

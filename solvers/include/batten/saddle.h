@@ -109,14 +109,17 @@ typedef struct batten_saddle_info {
   double time_assemble_s, time_project_s, time_factor_s, time_solve_s;
 
   /* ITERATIVE; rcond is 0 then, and residual is residual_rows. */
-  unsigned levels;          /* of the preconditioner, the exact one included */
-  size_t domains;           /* local solves */
-  size_t domains_double;    /* of which in double */
-  unsigned iterations;      /* of the last solve */
-  double residual_rows;     /* of the last solve: what options.accuracy speaks of */
-  size_t rows_checked;      /* on how many rows: min(N, 1000) */
-  double products_accuracy; /* asked for in the end */
-  double time_setup_s;      /* levels, local factors, plans */
+  unsigned levels;           /* of the preconditioner, the exact one included */
+  size_t level_sizes[8];     /* unknowns of the first 8 levels, the finest first; 0 where there is none */
+  size_t domains;            /* local solves */
+  size_t domains_double;     /* of which in double */
+  unsigned iterations;       /* of the last solve */
+  unsigned iterations_to[3]; /* of them, when the iteration's own residual first came below 1e-3, 1e-6, 1e-9; 0: it
+                                did not, or began there */
+  double residual_rows;      /* of the last solve: what options.accuracy speaks of */
+  size_t rows_checked;       /* on how many rows: min(N, 1000) */
+  double products_accuracy;  /* asked for in the end */
+  double time_setup_s;       /* levels, local factors, plans */
 } batten_saddle_info;
 
 typedef struct batten_saddle batten_saddle;
