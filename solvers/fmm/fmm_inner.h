@@ -40,7 +40,8 @@ typedef struct fmm_operators {
   size_t rank, stride; /* stride: rank, up to whole panels */
   unsigned classes;    /* 2^n */
   size_t class_full[FMM_CLASSES], class_rank[FMM_CLASSES];
-  size_t class_place[FMM_CLASSES];   /* where a class begins among the `rank` numbers */
+  size_t class_first[FMM_CLASSES];   /* where a class begins among the members */
+  size_t class_place[FMM_CLASSES];   /* ... and among the `rank` numbers */
   uint32_t *members;                 /* [full] entries of a tensor, class by class */
   double *reduce[FMM_CLASSES];       /* [class_full][class_rank] basis of a class */
   double *expand[FMM_CLASSES];       /* [class_rank][class_full] its transpose */

@@ -11,6 +11,10 @@
  * mirrors, so U splits into the 2^n classes of parity: singular vectors of 2^n matrices of a 2^n-th of the size, and
  * offsets of other signs have the same C_t up to the signs of rows and columns: 56 operators in 3-D in place of 316.
  *
+ * Permutations of the axes: the samples are closed under them, so that the classes with as many odd axes have the
+ * same singular vectors but for the order of the axes, and P U = U R with a small orthogonal R for each permutation
+ * P. Of the 56 operators 16 are made from the kernel, the others are R C_t R'.
+ *
  * Scale: phi(h r) = h^p phi(r). With the logarithm phi(h r) = h^p (phi(r) + ln h r^p): each level has C_t + ln h D_t,
  * D_t being made of r^p as C_t is of phi. r^p is a polynomial here and no more than a few columns in the sampled
  * space. */
@@ -99,11 +103,41 @@ static unsigned class_of(unsigned n, unsigned order, size_t entry) {
 static void make_classes(fmm_operators *o) {
   size_t next = 0;
   for (unsigned c = 0; c < o->classes; c++) {
-    const size_t first = next;
+    const size_t first = o->class_first[c] = next;
     for (size_t i = 0; i < o->full; i++)
       if (class_of(o->n, o->order, i) == c) o->members[next++] = (uint32_t)i;
     o->class_full[c] = next - first;
   }
+}
+
+/* Orders of the axes; the first two for n = 2. */
+enum { PERMUTATIONS = 6 };
+static const unsigned char AXES[PERMUTATIONS][3] = {{0, 1, 2}, {1, 0, 2}, {0, 2, 1}, {2, 1, 0}, {1, 2, 0}, {2, 0, 1}};
+
+static unsigned permutations(unsigned n) { return n == 2 ? 2 : PERMUTATIONS; }
+
+/* The entry whose place along axis a is that of `entry` along axes[a]. */
+static size_t permuted(const fmm_operators *o, size_t entry, const unsigned char *axes) {
+  size_t at[3] = {0}, out = 0;
+  for (unsigned a = o->n; a-- > 0; entry /= o->order) at[a] = entry % o->order;
+  for (unsigned a = 0; a < o->n; a++) out = out * o->order + at[axes[a]];
+  return out;
+}
+
+static unsigned permuted_class(unsigned n, unsigned c, const unsigned char *axes) {
+  unsigned out = 0;
+  for (unsigned a = 0; a < n; a++) out |= (c >> axes[a] & 1) << a;
+  return out;
+}
+
+/* The class with as many odd axes that has them first, and the permutation that leads there from c. */
+static unsigned first_class(unsigned n, unsigned c, const unsigned char **axes) {
+  for (unsigned p = 0; p < permutations(n); p++) {
+    const unsigned to = permuted_class(n, c, AXES[p]);
+    *axes = AXES[p];
+    if ((to & (to + 1)) == 0) return to;
+  }
+  return c;
 }
 
 /* Coordinates of node i of the grid of order^n, or of its mirror image. */
@@ -126,6 +160,19 @@ static bool kind_exists(unsigned n, unsigned kind) {
   return apart;
 }
 
+/* The kind whose offsets fall from axis to axis, and the number of the permutation that leads there. */
+static unsigned first_kind(unsigned n, unsigned kind, unsigned *permutation) {
+  for (unsigned p = 0; p < permutations(n); p++) {
+    unsigned to = 0;
+    bool falls = true;
+    for (unsigned a = 0; a < 3; a++) to |= (kind >> 2 * AXES[p][a] & 3) << 2 * a;
+    for (unsigned a = 0; a + 1 < 3; a++) falls = falls && (to >> 2 * a & 3) >= (to >> 2 * (a + 1) & 3);
+    *permutation = p;
+    if (falls) return to;
+  }
+  return kind;
+}
+
 /* ---- the basis ---- */
 
 typedef struct sampler {
@@ -135,13 +182,14 @@ typedef struct sampler {
   unsigned power;
   bool logarithm;
   double *grid[3]; /* [full] the nodes */
-  size_t kinds;
+  size_t kinds;    /* those whose offsets fall from axis to axis */
   unsigned kind[FMM_KINDS];
   size_t per_kind, columns;
-  double *samples;                 /* [columns][full], entries by class */
-  double *class_work[FMM_CLASSES]; /* [class_full^2] triangle of a class */
-  double *singular;                /* [full] by class */
-  double *scratch;                 /* [columns][2 * full] */
+  uint32_t *place;                 /* [full] of an entry within its class */
+  double *samples;                 /* [columns][full] */
+  double *class_work[FMM_CLASSES]; /* [class_full^2] triangle of a class; the first of those with as many odd axes */
+  double *singular[FMM_CLASSES];   /* [class_full] the same */
+  double *scratch;                 /* [columns][2 * full], then [permutations * columns][class_full] for each class */
 } sampler;
 
 /* A tensor over the nodes to one over the polynomials (or the reverse, by the matrix); ends in `in`. */
@@ -190,7 +238,7 @@ static void sample_task(void *arg, size_t index) {
     fill_power(s, y, work);
   }
   through(o, s->lanes, (const double(*)[FMM_ORDER_MAX])o->from_nodes, work, work + o->full);
-  for (size_t i = 0; i < o->full; i++) out[i] = work[o->members[i]];
+  memcpy(out, work, o->full * sizeof *out);
 }
 
 /* Householder QR of the samples of a class, one column for each of its m entries and a row for each sample: x has the
@@ -236,17 +284,23 @@ static void jacobi(const qp_lanes *lanes, size_t m, double *r, double *squares) 
   for (size_t i = 0; i < m; i++) lanes->dots(m, 1, r + i * m, m, r + i * m, &squares[i]);
 }
 
-static void class_task(void *arg, size_t c) {
+/* Samples of the class with the first `odd` axes odd, under all permutations. */
+static void class_task(void *arg, size_t odd) {
   const sampler *s = arg;
   const fmm_operators *o = s->o;
   const qp_lanes *lanes = qp_lanes_now();
-  size_t first = 0;
-  for (size_t k = 0; k < c; k++) first += o->class_full[k];
-  const size_t m = o->class_full[c];
-  double *x = s->scratch + first * s->columns, *squares = s->singular + first;
-  for (size_t j = 0; j < m; j++)
-    for (size_t i = 0; i < s->columns; i++) x[j * s->columns + i] = s->samples[i * o->full + first + j];
-  triangle(lanes, s->columns, m, x, squares, s->class_work[c]);
+  const unsigned c = (1u << odd) - 1, copies = permutations(o->n);
+  const size_t m = o->class_full[c], rows = copies * s->columns;
+  size_t before = 0;
+  for (size_t k = 0; k < odd; k++) before += o->class_full[(1u << k) - 1];
+  double *x = s->scratch + before * rows, *squares = s->singular[c];
+  const uint32_t *member = o->members + o->class_first[c];
+  for (unsigned p = 0; p < copies; p++)
+    for (size_t j = 0; j < m; j++) {
+      const double *from = s->samples + permuted(o, member[j], AXES[p]);
+      for (size_t i = 0; i < s->columns; i++) x[j * rows + i * copies + p] = from[i * o->full];
+    }
+  triangle(lanes, rows, m, x, squares, s->class_work[c]);
   jacobi(lanes, m, s->class_work[c], squares);
   for (size_t j = 0; j < m; j++) squares[j] = sqrt(squares[j]);
 }
@@ -254,12 +308,16 @@ static void class_task(void *arg, size_t c) {
 /* Columns of the triangles that are above the cut, normalised: the basis and its transpose. */
 static batten_status keep_basis(batten_context *ctx, const sampler *s, double cut) {
   fmm_operators *o = s->o;
+  const unsigned char *axes;
   double largest = 0;
-  size_t numbers = 0, first = 0;
-  for (size_t i = 0; i < o->full; i++) largest = fmax(largest, s->singular[i]);
-  for (unsigned c = 0; c < o->classes; first += o->class_full[c++]) {
+  size_t numbers = 0;
+  for (unsigned odd = 0; odd <= o->n; odd++)
+    for (size_t j = 0; j < o->class_full[(1u << odd) - 1]; j++)
+      largest = fmax(largest, s->singular[(1u << odd) - 1][j]);
+  for (unsigned c = 0; c < o->classes; c++) {
+    const double *singular = s->singular[first_class(o->n, c, &axes)];
     o->class_place[c] = o->rank;
-    for (size_t j = 0; j < o->class_full[c]; j++) o->class_rank[c] += s->singular[first + j] > cut * largest;
+    for (size_t j = 0; j < o->class_full[c]; j++) o->class_rank[c] += singular[j] > cut * largest;
     o->rank += o->class_rank[c];
     numbers += 2 * o->class_rank[c] * o->class_full[c];
   }
@@ -267,19 +325,21 @@ static batten_status keep_basis(batten_context *ctx, const sampler *s, double cu
   double *to = batten_alloc_array(ctx, numbers, sizeof *to);
   if (!to) return BATTEN_E_NOMEM;
   o->block = to;
-  first = 0;
-  for (unsigned c = 0; c < o->classes; first += o->class_full[c++]) {
+  for (unsigned c = 0; c < o->classes; c++) {
+    const unsigned from = first_class(o->n, c, &axes);
     const size_t m = o->class_full[c], rank = o->class_rank[c];
+    const uint32_t *member = o->members + o->class_first[c];
     o->reduce[c] = to, to += m * rank;
     o->expand[c] = to, to += m * rank;
-    for (size_t j = 0, k = 0; j < m; j++) {
-      const double value = s->singular[first + j];
-      if (!(value > cut * largest)) continue;
-      for (size_t i = 0; i < m; i++) {
-        const double u = s->class_work[c][j * m + i] / value;
+    for (size_t i = 0; i < m; i++) {
+      const size_t at = s->place[permuted(o, member[i], axes)];
+      for (size_t j = 0, k = 0; j < m; j++) {
+        const double value = s->singular[from][j];
+        if (!(value > cut * largest)) continue;
+        const double u = s->class_work[from][j * m + at] / value;
         o->reduce[c][i * rank + k] = u, o->expand[c][k * m + i] = u;
+        k++;
       }
-      k++;
     }
   }
   return BATTEN_OK;
@@ -288,32 +348,39 @@ static batten_status keep_basis(batten_context *ctx, const sampler *s, double cu
 static batten_status make_basis(batten_context *ctx, sampler *s, double cut) {
   fmm_operators *o = s->o;
   batten_status st = BATTEN_E_NOMEM;
-  size_t largest = 0, squares = 0;
-  for (unsigned c = 0; c < o->classes; c++) {
-    if (o->class_full[c] > largest) largest = o->class_full[c];
-    squares += o->class_full[c] * o->class_full[c];
+  const size_t copies = permutations(o->n);
+  size_t largest = 0, squares = 0, entries = 0;
+  for (unsigned odd = 0; odd <= o->n; odd++) {
+    const size_t m = o->class_full[(1u << odd) - 1];
+    if (m > largest) largest = m;
+    squares += m * (m + 1);
+    entries += m;
   }
-  s->per_kind = (6 * largest + s->kinds - 1) / s->kinds; /* 6 samples for each entry of the largest class */
+  /* 6 samples for each entry of the largest class */
+  s->per_kind = (6 * largest + copies * s->kinds - 1) / (copies * s->kinds);
   s->columns = s->kinds * s->per_kind * (s->logarithm ? 2 : 1);
+  const size_t sampling = 2 * o->full, factoring = copies * entries;
   double *work = NULL;
   s->samples = batten_alloc_array(ctx, s->columns, o->full * sizeof(double));
-  s->scratch = batten_alloc_array(ctx, s->columns, 2 * o->full * sizeof(double));
-  s->singular = batten_alloc_array(ctx, o->full, sizeof(double));
+  s->scratch = batten_alloc_array(ctx, s->columns, (sampling > factoring ? sampling : factoring) * sizeof(double));
+  s->place = batten_alloc_array(ctx, o->full, sizeof *s->place);
   work = batten_alloc_array(ctx, squares, sizeof(double));
-  if (!s->samples || !s->scratch || !s->singular || !work) goto done;
+  if (!s->samples || !s->scratch || !s->place || !work) goto done;
+  for (unsigned c = 0; c < o->classes; c++)
+    for (size_t i = 0; i < o->class_full[c]; i++) s->place[o->members[o->class_first[c] + i]] = (uint32_t)i;
   squares = 0;
-  for (unsigned c = 0; c < o->classes; c++) {
-    s->class_work[c] = work + squares;
-    squares += o->class_full[c] * o->class_full[c];
+  for (unsigned odd = 0; odd <= o->n; odd++) {
+    const unsigned c = (1u << odd) - 1;
+    s->singular[c] = work + squares, squares += o->class_full[c];
+    s->class_work[c] = work + squares, squares += o->class_full[c] * o->class_full[c];
   }
   if ((st = batten_progress(ctx, "operators", 0)) < 0) goto done;
   batten_parallel(ctx, s->columns, sample_task, s);
   if ((st = batten_progress(ctx, "operators", 0.1)) < 0) goto done;
-  batten_parallel(ctx, o->classes, class_task, s);
+  batten_parallel(ctx, o->n + 1, class_task, s);
   st = keep_basis(ctx, s, cut);
 done:
   batten_free(ctx, work);
-  batten_free(ctx, s->singular);
   batten_free(ctx, s->scratch);
   batten_free(ctx, s->samples);
   return st;
@@ -330,17 +397,18 @@ typedef struct transfers {
   double *panels;  /* [stride / FMM_PANEL][full][FMM_PANEL] the same as panels */
   double *scratch; /* for each task */
   size_t scratch_each, first;
+  size_t blocks; /* of columns: each task has one kind and one block */
   bool of_power;
+  double *rotation[PERMUTATIONS]; /* by class c: R' [of the class it comes from][of c] */
 } transfers;
 
 /* Basis vector k as a tensor over the nodes. */
 static void basis_at_nodes(const fmm_operators *o, const fmm_lanes *lanes, size_t k, double *out, double *spare) {
   memset(out, 0, o->full * sizeof *out);
-  size_t first = 0;
-  for (unsigned c = 0; c < o->classes; first += o->class_full[c++])
+  for (unsigned c = 0; c < o->classes; c++)
     if (k >= o->class_place[c] && k < o->class_place[c] + o->class_rank[c])
       for (size_t i = 0; i < o->class_full[c]; i++)
-        out[o->members[first + i]] = o->expand[c][(k - o->class_place[c]) * o->class_full[c] + i];
+        out[o->members[o->class_first[c] + i]] = o->expand[c][(k - o->class_place[c]) * o->class_full[c] + i];
   through(o, lanes, (const double(*)[FMM_ORDER_MAX])o->at_nodes, out, spare);
 }
 
@@ -366,46 +434,132 @@ static void kernel_panel(const transfers *w, const double t[3], size_t first, do
     }
 }
 
-/* C_t = U' (K_t U) for one kind, some columns at a time. scratch: panel [full][FMM_PANEL], product [COLUMN_BLOCK]
- * [full up to panels], tile [FMM_COLUMNS][FMM_PANEL]. */
+/* Columns of C_t = U' (K_t U) for one kind. scratch: panel [full][FMM_PANEL], product [COLUMN_BLOCK][full up to
+ * panels], tile [FMM_COLUMNS][FMM_PANEL]. */
 static void transfer_task(void *arg, size_t index) {
   const transfers *w = arg;
   const sampler *s = w->s;
   const fmm_operators *o = s->o;
-  const unsigned kind = s->kind[w->first + index];
+  const unsigned kind = s->kind[(w->first + index) / w->blocks];
+  const size_t k0 = (w->first + index) % w->blocks * COLUMN_BLOCK;
+  const size_t k1 = o->rank - k0 < COLUMN_BLOCK ? o->rank : k0 + COLUMN_BLOCK;
   const size_t full = o->full, padded = (full + FMM_PANEL - 1) / FMM_PANEL * FMM_PANEL;
   double *panel = w->scratch + index * w->scratch_each, *product = panel + full * FMM_PANEL;
   double *out = w->of_power ? o->transfer_power[kind] : o->transfer[kind], t[3];
   double *small = product + COLUMN_BLOCK * padded;
   offset_of(kind, t);
-  for (size_t k0 = 0; k0 < o->rank; k0 += COLUMN_BLOCK) {
-    const size_t k1 = o->rank - k0 < COLUMN_BLOCK ? o->rank : k0 + COLUMN_BLOCK;
-    for (size_t i = 0; i < full; i += FMM_PANEL) {
-      kernel_panel(w, t, i, panel);
-      for (size_t k = k0; k < k1; k += FMM_COLUMNS)
-        s->lanes->tile(full, panel, w->columns + k * full, full, product + (k - k0) * padded + i, padded);
-    }
-    for (size_t i = 0; i < o->stride; i += FMM_PANEL)
-      for (size_t k = k0; k < k1; k += FMM_COLUMNS) {
-        s->lanes->tile(full, w->panels + i * full, product + (k - k0) * padded, padded, small, FMM_PANEL);
-        for (size_t c = 0; c < FMM_COLUMNS && k + c < k1; c++)
-          memcpy(out + i * o->rank + (k + c) * FMM_PANEL, small + c * FMM_PANEL, FMM_PANEL * sizeof *out);
-      }
+  for (size_t i = 0; i < full; i += FMM_PANEL) {
+    kernel_panel(w, t, i, panel);
+    for (size_t k = k0; k < k1; k += FMM_COLUMNS)
+      s->lanes->tile(full, panel, w->columns + k * full, full, product + (k - k0) * padded + i, padded);
   }
+  for (size_t i = 0; i < o->stride; i += FMM_PANEL)
+    for (size_t k = k0; k < k1; k += FMM_COLUMNS) {
+      s->lanes->tile(full, w->panels + i * full, product + (k - k0) * padded, padded, small, FMM_PANEL);
+      for (size_t c = 0; c < FMM_COLUMNS && k + c < k1; c++)
+        memcpy(out + i * o->rank + (k + c) * FMM_PANEL, small + c * FMM_PANEL, FMM_PANEL * sizeof *out);
+    }
 }
 
+enum { TOGETHER = 8 }; /* tasks between two calls of the host's progress callback */
+
 static batten_status run_transfers(batten_context *ctx, transfers *w, double from, double to) {
-  enum { TOGETHER = 8 };
   const fmm_operators *o = w->s->o;
-  const size_t padded = (o->full + FMM_PANEL - 1) / FMM_PANEL * FMM_PANEL;
+  const size_t padded = (o->full + FMM_PANEL - 1) / FMM_PANEL * FMM_PANEL, tasks = w->s->kinds * w->blocks;
   w->scratch_each = o->full * FMM_PANEL + COLUMN_BLOCK * padded + FMM_COLUMNS * FMM_PANEL;
   w->scratch = batten_alloc_array(ctx, TOGETHER, w->scratch_each * sizeof *w->scratch);
   if (!w->scratch) return BATTEN_E_NOMEM;
   batten_status st = BATTEN_OK;
-  for (w->first = 0; w->first < w->s->kinds && st >= 0; w->first += TOGETHER) {
-    st = batten_progress(ctx, "operators", from + (to - from) * (double)w->first / (double)w->s->kinds);
-    const size_t left = w->s->kinds - w->first;
+  for (w->first = 0; w->first < tasks && st >= 0; w->first += TOGETHER) {
+    st = batten_progress(ctx, "operators", from + (to - from) * (double)w->first / (double)tasks);
+    const size_t left = tasks - w->first;
     if (st >= 0) batten_parallel(ctx, left < TOGETHER ? left : TOGETHER, transfer_task, w);
+  }
+  batten_free(ctx, w->scratch);
+  return st;
+}
+
+/* ---- other orders of the axes ---- */
+
+/* R = U' P U: row class c comes from the class that the permutation makes of it. */
+static batten_status make_rotation(batten_context *ctx, const sampler *s, unsigned permutation, double **rotation) {
+  const fmm_operators *o = s->o;
+  const unsigned char *axes = AXES[permutation];
+  size_t numbers = 0, largest = 0;
+  for (unsigned c = 0; c < o->classes; c++) {
+    numbers += o->class_rank[c] * o->class_rank[c];
+    if (o->class_full[c] > largest) largest = o->class_full[c];
+  }
+  double *moved = batten_alloc_array(ctx, largest, sizeof *moved), *to = NULL;
+  if (moved) to = *rotation = batten_alloc_array(ctx, numbers, sizeof *to);
+  if (to) memset(to, 0, numbers * sizeof *to);
+  for (unsigned c = 0; c < o->classes && to; c++) {
+    const unsigned from = permuted_class(o->n, c, axes);
+    const size_t m = o->class_full[c], rank = o->class_rank[c];
+    for (size_t b = 0; b < rank; b++, to += rank) {
+      for (size_t i = 0; i < m; i++)
+        moved[i] = o->expand[from][b * m + s->place[permuted(o, o->members[o->class_first[c] + i], axes)]];
+      s->lanes->combine(m, rank, o->reduce[c], moved, to);
+    }
+  }
+  batten_free(ctx, moved);
+  return to ? BATTEN_OK : BATTEN_E_NOMEM;
+}
+
+/* C_t = R C R' of the kind with falling offsets; scratch: two matrices, two rows. */
+static void rotate_task(void *arg, size_t index) {
+  const transfers *w = arg;
+  const fmm_operators *o = w->s->o;
+  unsigned permutation, seen = 0, kind = 0, from = 0;
+  for (; kind < FMM_KINDS; kind++) {
+    if (!kind_exists(o->n, kind) || (from = first_kind(o->n, kind, &permutation)) == kind) continue;
+    if (seen++ == w->first + index) break;
+  }
+  const unsigned char *axes = AXES[permutation];
+  const size_t rank = o->rank;
+  const double *in = w->of_power ? o->transfer_power[from] : o->transfer[from];
+  double *out = w->of_power ? o->transfer_power[kind] : o->transfer[kind];
+  double *dense = w->scratch + index * w->scratch_each, *half = dense + rank * rank, *row = half + rank * rank;
+  double *factors = row + rank;
+  for (size_t i = 0; i < rank; i++)
+    for (size_t k = 0; k < rank; k++)
+      dense[i * rank + k] = in[i / FMM_PANEL * FMM_PANEL * rank + k * FMM_PANEL + i % FMM_PANEL];
+  memset(half, 0, rank * rank * sizeof *half);
+  const double *r = w->rotation[permutation];
+  for (unsigned c = 0; c < o->classes; c++) {
+    const size_t m = o->class_rank[c], source = o->class_place[permuted_class(o->n, c, axes)];
+    for (size_t a = 0; a < m; a++) {
+      for (size_t b = 0; b < m; b++) factors[b] = r[b * m + a];
+      w->s->lanes->combine(m, rank, dense + source * rank, factors, half + (o->class_place[c] + a) * rank);
+    }
+    r += m * m;
+  }
+  memset(out, 0, o->stride * rank * sizeof *out);
+  for (size_t i = 0; i < rank; i++) {
+    memset(row, 0, rank * sizeof *row);
+    r = w->rotation[permutation];
+    for (unsigned c = 0; c < o->classes; c++) {
+      const size_t m = o->class_rank[c], source = o->class_place[permuted_class(o->n, c, axes)];
+      w->s->lanes->combine(m, m, r, half + i * rank + source, row + o->class_place[c]);
+      r += m * m;
+    }
+    for (size_t k = 0; k < rank; k++) out[i / FMM_PANEL * FMM_PANEL * rank + k * FMM_PANEL + i % FMM_PANEL] = row[k];
+  }
+}
+
+static batten_status run_rotations(batten_context *ctx, transfers *w, double at) {
+  const fmm_operators *o = w->s->o;
+  size_t tasks = 0;
+  for (unsigned k = 0; k < FMM_KINDS; k++) tasks += kind_exists(o->n, k);
+  tasks -= w->s->kinds;
+  w->scratch_each = 2 * o->rank * (o->rank + 1);
+  w->scratch = batten_alloc_array(ctx, TOGETHER, w->scratch_each * sizeof *w->scratch);
+  if (!w->scratch) return BATTEN_E_NOMEM;
+  batten_status st = BATTEN_OK;
+  for (w->first = 0; w->first < tasks && st >= 0; w->first += TOGETHER) {
+    st = batten_progress(ctx, "operators", at);
+    const size_t left = tasks - w->first;
+    if (st >= 0) batten_parallel(ctx, left < TOGETHER ? left : TOGETHER, rotate_task, w);
   }
   batten_free(ctx, w->scratch);
   return st;
@@ -414,13 +568,14 @@ static batten_status run_transfers(batten_context *ctx, transfers *w, double fro
 static batten_status make_transfers(batten_context *ctx, const sampler *s) {
   fmm_operators *o = s->o;
   const size_t columns = (o->rank + FMM_COLUMNS - 1) / FMM_COLUMNS * FMM_COLUMNS;
-  transfers w = {.s = s, .fill = s->lanes->fill(o->n, s->power)};
+  transfers w = {
+      .s = s, .fill = s->lanes->fill(o->n, s->power), .blocks = (o->rank + COLUMN_BLOCK - 1) / COLUMN_BLOCK};
   batten_status st = BATTEN_E_NOMEM;
   w.columns = batten_alloc_array(ctx, columns + 1, o->full * sizeof(double)); /* + 1: spare of basis_at_nodes */
   w.panels = batten_alloc_array(ctx, o->stride, o->full * sizeof(double));
   if (!w.columns || !w.panels) goto done;
-  for (size_t i = 0; i < s->kinds; i++) {
-    const unsigned kind = s->kind[i];
+  for (unsigned kind = 0; kind < FMM_KINDS; kind++) {
+    if (!kind_exists(o->n, kind)) continue;
     if (!(o->transfer[kind] = batten_alloc_array(ctx, o->stride * o->rank, sizeof(double)))) goto done;
     if (s->logarithm && !(o->transfer_power[kind] = batten_alloc_array(ctx, o->stride * o->rank, sizeof(double))))
       goto done;
@@ -432,10 +587,15 @@ static batten_status make_transfers(batten_context *ctx, const sampler *s) {
     basis_at_nodes(o, s->lanes, k, column, w.columns + columns * o->full);
     for (size_t i = 0; i < o->full; i++) panel[i * FMM_PANEL] = column[i];
   }
-  if ((st = run_transfers(ctx, &w, 0.2, s->logarithm ? 0.6 : 1)) < 0 || !s->logarithm) goto done;
+  for (unsigned p = 1; p < permutations(o->n); p++)
+    if ((st = make_rotation(ctx, s, p, &w.rotation[p])) < 0) goto done;
+  if ((st = run_transfers(ctx, &w, 0.2, s->logarithm ? 0.5 : 0.9)) < 0) goto done;
+  if ((st = run_rotations(ctx, &w, s->logarithm ? 0.5 : 0.9)) < 0 || !s->logarithm) goto done;
   w.of_power = true;
-  st = run_transfers(ctx, &w, 0.6, 1);
+  if ((st = run_transfers(ctx, &w, 0.6, 0.9)) < 0) goto done;
+  st = run_rotations(ctx, &w, 0.9);
 done:
+  for (unsigned p = 0; p < PERMUTATIONS; p++) batten_free(ctx, w.rotation[p]);
   batten_free(ctx, w.panels);
   batten_free(ctx, w.columns);
   return st;
@@ -482,16 +642,18 @@ batten_status batten_fmm_operators_new(batten_context *ctx, const batten_radial 
     node_at(o, i, x);
     for (unsigned a = 0; a < 3; a++) s.grid[a][i] = x[a];
   }
-  for (unsigned k = 0; k < FMM_KINDS; k++)
-    if (kind_exists(o->n, k)) s.kind[s.kinds++] = k;
+  for (unsigned k = 0, permutation; k < FMM_KINDS; k++)
+    if (kind_exists(o->n, k) && first_kind(o->n, k, &permutation) == k) s.kind[s.kinds++] = k;
   if ((st = make_basis(ctx, &s, orders.cut)) < 0) goto done;
   if ((st = make_transfers(ctx, &s)) < 0) goto done;
   batten_free(ctx, s.grid[0]);
-  s.grid[0] = NULL;
+  batten_free(ctx, s.place);
+  s.grid[0] = NULL, s.place = NULL;
   o->bytes = batten_bytes_in_use(ctx) - before;
   *out = o;
   o = NULL;
 done:
+  batten_free(ctx, s.place);
   batten_free(ctx, s.grid[0]);
   batten_fmm_operators_free(o);
   return st;

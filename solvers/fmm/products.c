@@ -15,8 +15,8 @@
 /* ---- the far field's product ---- */
 
 /* How much of a tile fits the registers: 3 vectors times 8 columns of 32 registers with AVX-512, 3 times 4 of 16
- * otherwise. Vectors are the processor's own: gcc takes wider ones apart through memory, at a tenth of the speed. Each
- * number of the product is one sum over k in its order, however the tile is cut. */
+ * otherwise. Vectors are the processor's own: gcc takes wider ones apart through memory, at a tenth of the speed.
+ * Each number of the product is one sum over k in its order, however the tile is cut. */
 #if defined(__AVX512F__)
 enum { VECTOR = 8, PART_COLUMNS = 8 };
 #define COLUMNS(X) X(0) X(1) X(2) X(3) X(4) X(5) X(6) X(7)
@@ -54,8 +54,7 @@ static inline void part(size_t depth, const double *panel, const double *b, size
 
 static void tile(size_t depth, const double *panel, const double *b, size_t ldb, double *y, size_t ldy) {
   for (size_t c = 0; c < FMM_COLUMNS; c += PART_COLUMNS)
-    for (size_t i = 0; i < FMM_PANEL; i += PART_ROWS)
-      part(depth, panel + i, b + c * ldb, ldb, y + c * ldy + i, ldy);
+    for (size_t i = 0; i < FMM_PANEL; i += PART_ROWS) part(depth, panel + i, b + c * ldb, ldb, y + c * ldy + i, ldy);
 }
 
 static void contract(unsigned order, size_t rest, const double (*matrix)[FMM_ORDER_MAX], const double *in,
