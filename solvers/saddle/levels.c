@@ -3,8 +3,8 @@
  * A kd-tree halves the points of a level down to cells of at most 8. In each cell the one next to the middle of the
  * cell's box goes to the next level, which so has an eighth of the unknowns or somewhat more, spread as they are;
  * with the extreme ones along each axis, as an outlier alone holds a polynomial. The halves of at most 512 are the
- * domains' own unknowns. A domain grows beyond them along the graph of the nearest neighbours, ring by ring: by
- * distance to its box it would starve on the side where points are sparse. */
+ * domains' own unknowns. A domain grows beyond them along the graph of the nearest neighbours, ring by ring, and in a
+ * ring nearest ones first: by distance to its box it would starve on the side where points are sparse. */
 #include <string.h>
 
 #include "base/neighbours.h"
@@ -212,8 +212,25 @@ static bool next_half(halves *h, size_t *low, size_t *high) {
   return true;
 }
 
-/* Members of each domain: its own, then others as they are met along the graph, the nearest rings first. stamp
- * [count]: zeros. */
+/* Adds to a domain of `count` members what is next to members low .. count - 1 and not in it, up to `wanted` in all:
+ * the nearest neighbour of each, then the second of each, and so on. Memory does as a rule not reach for all of a
+ * ring, and an unknown at the rim that got nothing across it would be solved for as if the data ended there: with
+ * one unknown's neighbours after the other's 40,000 points took 9 iterations instead of 5. */
+static size_t add_ring(const graph *g, size_t mark, size_t low, size_t count, size_t wanted, size_t *member,
+                       size_t *stamp) {
+  const size_t high = count;
+  for (size_t j = 0; j < g->k && count < wanted; j++)
+    for (size_t i = low; i < high && count < wanted; i++) {
+      if (j >= g->found[member[i]]) continue;
+      size_t at = g->near[member[i] * g->k + j];
+      if (stamp[at] == mark) continue;
+      stamp[at] = mark;
+      member[count++] = at;
+    }
+  return count;
+}
+
+/* Members of each domain: its own, then ring by ring along the graph. stamp [count]: zeros. */
 static void make_domains(saddle_level *l, const size_t *order, const graph *g, double overlap, size_t *stamp,
                          size_t *most) {
   halves parts = halves_of(l->count, SADDLE_OWN_MAX);
@@ -222,13 +239,10 @@ static void make_domains(saddle_level *l, const size_t *order, const graph *g, d
     size_t own = high - low, wanted = own + saddle_added(own, overlap), count = own;
     memcpy(member, order + low, own * sizeof *member);
     for (size_t i = 0; i < own; i++) stamp[member[i]] = d + 1;
-    for (size_t head = 0; head < count && count < wanted; head++) {
-      const size_t *near = g->near + member[head] * g->k;
-      for (size_t j = 0; j < g->found[member[head]] && count < wanted; j++) {
-        if (stamp[near[j]] == d + 1) continue;
-        stamp[near[j]] = d + 1;
-        member[count++] = near[j];
-      }
+    for (size_t ring = 0; ring < count && count < wanted;) {
+      const size_t next = count;
+      count = add_ring(g, d + 1, ring, count, wanted, member, stamp);
+      ring = next;
     }
     l->domains[d].own = own;
     l->domains[d].count = count;

@@ -62,7 +62,7 @@ static void test_awkward(batten_context *ctx) {
   smooth_data(&s);
   s.x[3 * 17] = 1e6;
   s.f[17] = 0;
-  awkward(ctx, &s, 30, "an outlier");
+  awkward(ctx, &s, 14, "an outlier");
   scene_free(&s);
 
   s = scene_new(SCENE_SPHERE, KERNEL_R, N, 4, 11); /* a thousandth of the spacing on a cap */
@@ -71,19 +71,19 @@ static void test_awkward(batten_context *ctx) {
     x[0] *= 1e-3, x[1] *= 1e-3, x[2] = sqrt(1 - x[0] * x[0] - x[1] * x[1]);
   }
   for (size_t i = 0; i < N; i++) s.f[i] = sin(3 * s.x[3 * i]) + s.x[3 * i + 1] * s.x[3 * i + 2];
-  awkward(ctx, &s, 12, "densities 1 : 1000");
+  awkward(ctx, &s, 9, "densities 1 : 1000");
   scene_free(&s);
 
   s = scene_new(SCENE_RANDOM, KERNEL_R, N, 4, 12); /* every domain is flat, or of few flats: P is singular there */
   for (size_t i = 0; i < N; i++) s.x[3 * i + i % 3] = s.x[3 * i + i % 3] < 0 ? -1 : 1;
   smooth_data(&s);
-  awkward(ctx, &s, 12, "a cube's faces");
+  awkward(ctx, &s, 9, "a cube's faces");
   scene_free(&s);
 
   s = scene_new(SCENE_RANDOM, KERNEL_R, N, 4, 13); /* lines */
   for (size_t i = 0; i < N; i++) s.x[3 * i + i % 3] = 0, s.x[3 * i + (i + 1) % 3] = 0.5;
   smooth_data(&s);
-  awkward(ctx, &s, 60, "three lines");
+  awkward(ctx, &s, 18, "three lines");
   scene_free(&s);
 }
 
