@@ -19,6 +19,7 @@ batten_solid_options batten_solid_options_default(void) {
 typedef struct attempt {
   batten_solid *solid;
   batten_spline_info spline;
+  batten_spline_reduce_info reduced;
   double value_range;
   batten_orient_data data; /* AUTO: the carrier alone */
   batten_sign_check check;
@@ -57,6 +58,12 @@ static batten_status check_options(batten_context *ctx, unsigned n, const batten
     return batten_fail(ctx, BATTEN_E_INVALID, "opt.merge_radius: %g; give a length >= 0", o->merge_radius);
   if (!(o->pair_distance > 0 && o->pair_distance <= 1))
     return batten_fail(ctx, BATTEN_E_INVALID, "opt.pair_distance: %g; give 0 < it <= 1", o->pair_distance);
+  if (!(o->reduce >= 0) || !isfinite(o->reduce))
+    return batten_fail(ctx, BATTEN_E_INVALID, "opt.reduce: %g; give a length >= 0", o->reduce);
+  if (o->reduce > 0 && o->orient_data == BATTEN_ORIENT_DATA_GRADIENTS)
+    return batten_fail(ctx, BATTEN_E_INVALID,
+                       "opt.reduce: %g with opt.orient_data gradients; a tolerance is for points alone, give pairs",
+                       o->reduce);
   if (o->check_cells < 8 || o->check_cells > 1000)
     return batten_fail(ctx, BATTEN_E_INVALID, "opt.check_cells: %zu; give 8 to 1000", o->check_cells);
   if (2 * o->spline.m <= n || o->spline.m > 4)
@@ -170,7 +177,7 @@ static batten_status fit_with_carrier(fit_state *f, attempt *a) {
   data.values = values;
   batten_spline_options o = f->opt.spline;
   o.smoothing_per_point = d->smoothing;
-  st = batten_spline_fit(ctx, &data, &o, &spline, &a->spline);
+  st = batten_solid_fit_spline(ctx, &f->opt, f->carrier, d->count, &data, &o, &spline, &a->spline, &a->reduced);
   if (st >= 0) st = batten_solid_new(ctx, spline, f->carrier, 1, d->count, d->points, d->lower, d->upper, &a->solid);
   if (st >= 0) st = is_reproduced(f, a->solid, &reproduced, &scale);
   if (st >= 0 && reproduced) st = refuse_carrier(ctx, f->carrier, f->opt.spline.m);
@@ -212,7 +219,7 @@ static batten_status try_oriented(fit_state *f, batten_orient_data data, attempt
     st = need_carrier(f);
     if (st >= 0)
       st = batten_solid_fit_pairs(f->ctx, &f->data, f->normals, f->carrier, &f->opt, &a->solid, &a->spline,
-                                  &a->value_range);
+                                  &a->reduced, &a->value_range);
   }
   f->info.time_fit_s += batten_now() - start;
   return st < 0 ? st : check_attempt(f, a);
@@ -223,12 +230,14 @@ static batten_status try_oriented(fit_state *f, batten_orient_data data, attempt
 /* Iteration promises a 2-norm, factors every point. */
 static bool is_iterative(const batten_spline_info *i) { return i->saddle.method == BATTEN_SADDLE_ITERATIVE; }
 
-static bool is_accurate(const fit_state *f, const batten_spline_info *i) {
+static bool is_accurate(const fit_state *f, const attempt *a) {
+  const batten_spline_info *i = &a->spline;
+  if (f->opt.reduce > 0) return a->reduced.ratio_max <= 1;
   if (is_iterative(i)) return i->saddle.residual_rows <= f->opt.spline.saddle.accuracy;
   return i->residual_max <= RESIDUAL;
 }
 
-static bool is_good(const fit_state *f, const attempt *a) { return a->check.clean && is_accurate(f, &a->spline); }
+static bool is_good(const fit_state *f, const attempt *a) { return a->check.clean && is_accurate(f, a); }
 
 static size_t complaints(const batten_sign_check *c) {
   return c->weak_gradients + c->flipped_neighbours + c->phantom_components + c->phantom_cells;
@@ -288,7 +297,7 @@ enum { GRADIENT_POINTS = 2000 };
 static batten_status cure(fit_state *f) {
   batten_orient_data kinds[2] = {f->opt.orient_data, f->opt.orient_data};
   if (f->opt.orient_data == BATTEN_ORIENT_DATA_AUTO) {
-    bool small = f->data.count <= GRADIENT_POINTS || f->data.n == 1;
+    bool small = (f->data.count <= GRADIENT_POINTS || f->data.n == 1) && f->opt.reduce == 0;
     kinds[0] = small ? BATTEN_ORIENT_DATA_GRADIENTS : BATTEN_ORIENT_DATA_PAIRS;
     kinds[1] = BATTEN_ORIENT_DATA_PAIRS;
   }
@@ -343,6 +352,16 @@ static batten_status ambiguous(const fit_state *f) {
           : "give opt.normals, or more points where the surface is thin or open");
 }
 
+static batten_status judge_reduced(const fit_state *f) {
+  if (is_accurate(f, &f->best)) return BATTEN_OK;
+  const batten_spline_reduce_info *r = &f->best.reduced;
+  return batten_fail(f->ctx, BATTEN_W_ACCURACY,
+                     "points: with %zu centres the surface is up to %.3g away from them, and the worst of all data "
+                     "misses %.3g times its tolerance; give a larger opt.reduce = %g, %s",
+                     r->centers, r->error_certified, r->ratio_max, f->opt.reduce,
+                     f->opt.spline.smoothing > 0 || f->data.smoothing ? "or less smoothing" : "or opt.merge_radius");
+}
+
 static batten_status finish(fit_state *f) {
   batten_status st = measure_residual(f);
   if (st < 0) return st;
@@ -359,13 +378,15 @@ static batten_status finish(fit_state *f) {
   info->orient_data = f->best.data;
   info->check_final = f->best.check;
   info->spline = f->best.spline;
+  info->reduced = f->best.reduced;
   info->spacing = f->data.spacing_median;
   info->sign = !f->best.check.clean ? BATTEN_SIGN_AMBIGUOUS : first_was_left ? BATTEN_SIGN_CURED : BATTEN_SIGN_CLEAN;
   if (!f->best.check.clean) return ambiguous(f);
+  if (f->opt.reduce > 0) return judge_reduced(f);
   /* The saddle solver's tolerance is for its equations; here counts how near f comes to 0, or, where smoothing keeps
    * it away, the spline to what it aims at. */
   double miss = fmin(info->residual_max, info->spline.residual_max);
-  if (miss <= RESIDUAL || (is_iterative(&info->spline) && is_accurate(f, &info->spline))) return BATTEN_OK;
+  if (miss <= RESIDUAL || (is_iterative(&info->spline) && is_accurate(f, &f->best))) return BATTEN_OK;
   if (is_iterative(&info->spline))
     return batten_fail(f->ctx, BATTEN_W_ACCURACY,
                        "points: residual %.3g (2-norm), above opt.spline.saddle.accuracy = %g, and the surface up to "

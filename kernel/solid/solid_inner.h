@@ -58,6 +58,14 @@ batten_status batten_solid_fit_gradients(batten_context *ctx, const surface_data
                                          batten_spline_info *info, double *value_range);
 batten_status batten_solid_fit_pairs(batten_context *ctx, const surface_data *d, const double *normals,
                                      batten_carrier *carrier, const batten_solid_options *opt, batten_solid **out,
-                                     batten_spline_info *info, double *value_range);
+                                     batten_spline_info *info, batten_spline_reduce_info *reduced,
+                                     double *value_range);
+
+/* The spline U = f_c - f of data whose first `surface` points have f = 0: through all, or with opt->reduce with fewer
+ * centres; without it reduced is zero. */
+batten_status batten_solid_fit_spline(batten_context *ctx, const batten_solid_options *opt,
+                                      const batten_carrier *carrier, size_t surface, const batten_spline_data *data,
+                                      const batten_spline_options *o, batten_spline **out, batten_spline_info *info,
+                                      batten_spline_reduce_info *reduced);
 
 #endif

@@ -231,7 +231,8 @@ static void subtract_from_carrier(collection *c, size_t first_far, double slope,
 
 batten_status batten_solid_fit_pairs(batten_context *ctx, const surface_data *d, const double *normals,
                                      batten_carrier *carrier, const batten_solid_options *opt, batten_solid **out,
-                                     batten_spline_info *info, double *value_range) {
+                                     batten_spline_info *info, batten_spline_reduce_info *reduced,
+                                     double *value_range) {
   collection c = {0};
   batten_spline *spline = NULL;
   double *of_carrier = NULL, slope = 1;
@@ -255,7 +256,7 @@ batten_status batten_solid_fit_pairs(batten_context *ctx, const surface_data *d,
   data.count = c.count;
   data.points = c.points;
   data.values = c.values;
-  st = batten_spline_fit(ctx, &data, &o, &spline, info);
+  st = batten_solid_fit_spline(ctx, opt, carrier, d->count, &data, &o, &spline, info, reduced);
   if (st >= 0) st = batten_solid_new(ctx, spline, carrier, 1, d->count, d->points, d->lower, d->upper, out);
   if (st >= 0) *value_range = range_of(c.count, c.values);
 done:

@@ -72,6 +72,9 @@ typedef struct batten_solid_options {
   size_t energy_points; /* least-energy orientation works on at most so many points. Default 1000. */
   double pair_distance; /* off-surface distance over the local spacing, in (0, 1]. Default 0.5. */
   size_t check_cells;   /* cells of the sign check's grid along the longest side, 8 .. 1000. Default 40. */
+  double reduce;        /* distance, caller's unit, >= 0: so few points become centres of the spline that the surface is
+                           within it of all, |f| / |grad f| <= reduce; batten_spline_fit_reduced(). Orientation then
+                           enters as pairs, of which half the height may be missed. 0: all points. Default 0. */
   batten_spline_options spline;
 } batten_solid_options;
 BATTEN_API batten_solid_options batten_solid_options_default(void);
@@ -103,12 +106,13 @@ typedef struct batten_solid_info {
   double distance_max;       /* max |f(x_i)| / |grad f(x_i)|, caller's unit */
   double spacing;            /* median distance to the nearest other point, caller's unit */
   batten_spline_info spline; /* of the fit that is returned */
+  batten_spline_reduce_info reduced; /* of that fit; errors are distances at the points; 0 without opt.reduce */
   double time_fit_s, time_check_s, time_orient_s;
 } batten_solid_info;
 
 /* Fit to points [count][n], n = 2 or 3. In one dimension an even number of points bounds intervals, and their order
  * orients them. Positive status: BATTEN_W_AMBIGUOUS, BATTEN_W_ACCURACY (residual_max above 1e-10; by ITERATIVE,
- * spline.saddle.residual_rows above opt.spline.saddle.accuracy). Fails as
+ * spline.saddle.residual_rows above opt.spline.saddle.accuracy; with opt.reduce, reduced.ratio_max above 1). Fails as
  * batten_spline_fit, and INVALID for a carrier that the spline reproduces (the text says which to take): every
  * carrier alone with m >= 3 needs orientation, and without a carrier of the caller's it is estimated at once. *out
  * untouched on failure; info may be NULL. The check costs (about 1.5 check_cells)^n evaluations of f. */

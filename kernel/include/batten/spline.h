@@ -77,6 +77,65 @@ BATTEN_API batten_status batten_spline_fit(batten_context *ctx, const batten_spl
                                            const batten_spline_options *opt, batten_spline **out,
                                            batten_spline_info *info);
 
+/* Fewer centres than points. */
+typedef struct batten_spline_reduce_options {
+  size_t struct_size;
+  double tolerance;         /* > 0: what |U(x_i) - v_i| may be at each point, unit of the values. Has no default. */
+  const double *tolerances; /* [N] > 0, one for each point in place of tolerance; NULL = the same for all */
+  size_t distance_count;    /* D <= N: where U stands for a field F with F(x_i) = v_i, the tolerances of the first D
+                               points are distances: |f| / |grad f| <= tolerance, f = F - U. Default 0. */
+  const double *field_gradients; /* [D][n] grad F(x_i) */
+  size_t centers_max;       /* stops there and tells what was reached; 0 = no limit. Default 0. */
+  double share_max;         /* in (0, 1]: where more than this share of the points is wanted, all are taken.
+                               Default 0.5. */
+  double terms_max;         /* the final check sums directly at all points up to so many terms (N + D) C; above
+                               at a part of them, 1000 at least, and rounds take fast sums; >= 0. Default 2e10, about
+                               30 s of one core. n = 1 has direct sums alone. */
+} batten_spline_reduce_options;
+BATTEN_API batten_spline_reduce_options batten_spline_reduce_options_default(void);
+
+enum { BATTEN_SPLINE_REDUCE_ROUNDS = 40 };
+
+typedef struct batten_spline_reduce_round {
+  size_t centers;
+  double ratio_max; /* largest error over its tolerance */
+} batten_spline_reduce_round;
+
+/* Errors are |U(x_i) - v_i|; with distance_count, distances at those points alone. */
+typedef struct batten_spline_reduce_info {
+  size_t centers;            /* C */
+  int all;                   /* non-zero: every point (of equal ones the first) has become a centre */
+  unsigned rounds;           /* fits */
+  batten_spline_reduce_round history[BATTEN_SPLINE_REDUCE_ROUNDS];
+  size_t certified_points;   /* points whose error was summed directly in the end */
+  double error_max, error_rms; /* at all points: direct where certified, else by fast sums */
+  double error_certified;    /* bound of the error at all points: error_max, or, where not all were summed directly,
+                                at the others that of fast sums and the largest that they were off at the certified */
+  double ratio_max;          /* error_certified's counterpart over the tolerances: met when <= 1 */
+  double time_select_s, time_fit_s, time_evaluate_s, time_certify_s, time_total_s;
+  batten_spline_info fit;    /* of the last fit, to its centres; without leave-one-out errors */
+} batten_spline_reduce_info;
+
+/* Fits to so many of the points, the centres, that U meets all of them to a tolerance.   [Carr et al. 2001, section 5]
+ *
+ * Starts from some well-spread points; each round fits, looks at all points, and adds those that are missed by most,
+ * no two of a round nearer to each other than a distance that shrinks from round to round. In the end the errors are
+ * measured anew by batten_spline_evaluate(), which knows nothing of the fit nor of fast sums. Between the points
+ * nothing is promised: there U is a spline of fewer data.
+ *
+ *   opt     smoothing holds U off its centres: with it a tolerance may not be reached. loo_samples is not read.
+ *           An iteration is as accurate as the tolerance needs, in place of saddle.accuracy
+ *   reduce  not NULL
+ * Points may be equal: the first of them can be a centre. The choice does not depend on the order of the points up to
+ * ties, nor on the threads. Where all points are taken, the result is that of batten_spline_fit().
+ * Positive status: BATTEN_W_ACCURACY when ratio_max > 1 (the text names the point).
+ * Time: about that of two fits of C centres and 2 N C terms, or O(N) where fast sums serve; memory about 120 N bytes
+ * beside the fit. Progress phase "reduce". Fails: as batten_spline_fit(), and INVALID for gradients in the data. */
+BATTEN_API batten_status batten_spline_fit_reduced(batten_context *ctx, const batten_spline_data *data,
+                                                   const batten_spline_options *opt,
+                                                   const batten_spline_reduce_options *reduce, batten_spline **out,
+                                                   batten_spline_reduce_info *info);
+
 /* Everything that defines a spline, for saving and loading: pointers into the spline. */
 typedef struct batten_spline_parts {
   size_t struct_size;
