@@ -20,6 +20,7 @@ enum {
   OPT_ORDER,
   OPT_SMOOTHING,
   OPT_MERGE,
+  OPT_REDUCE,
   OPT_ORIENTATION,
   OPT_ORIENT_DATA,
   OPT_ORIENT_METHOD,
@@ -39,6 +40,9 @@ static const cli_option table[] = {
     {"order", OPT_ORDER, "M", "order of the spline's energy, 2 to 4; default 2"},
     {"smoothing", OPT_SMOOTHING, "RHO", "0 passes through the points, larger is smoother; default 0"},
     {"merge-radius", OPT_MERGE, "R", "points closer than this become one; default 0: equal points only"},
+    {"reduce", OPT_REDUCE, "DISTANCE",
+     "use so few of the points as centres that the surface is within this\n"
+     "distance of all points, measured anew at each; default 0: all points"},
     {"orientation", OPT_ORIENTATION, "HOW",
      "auto (where the check of the sign asks for it), never, given (normals\n"
      "of the file), estimate; default auto"},
@@ -102,6 +106,9 @@ static bool take_fit_option(solid_request *q, int key, const char *v) {
       break;
     case OPT_MERGE:
       ok = cli_parse_number("--merge-radius", v, 0, INFINITY, &q->fit.merge_radius);
+      break;
+    case OPT_REDUCE:
+      ok = cli_parse_number("--reduce", v, 0, INFINITY, &q->fit.reduce);
       break;
     case OPT_ORIENTATION:
       ok = cli_parse_word("--orientation", v, orientations, &word);

@@ -49,6 +49,24 @@ static void report_iteration(const solid_work *w, cli_report *r) {
   cli_report_number(r, "time_setup_s", used ? s->time_setup_s : NAN);
 }
 
+/* What was asked for and came of it, null without. */
+static void report_reduction(const solid_work *w, cli_report *r) {
+  const batten_spline_reduce_info *i = &w->info.reduced;
+  const bool used = w->request->fit.reduce > 0;
+  cli_report_number(r, "reduce", used ? w->request->fit.reduce : NAN);
+  cli_report_number(r, "distance_certified", used ? i->error_certified : NAN);
+  cli_report_number(r, "distance_rms", used ? i->error_rms : NAN);
+  cli_report_number(r, "reduce_ratio", used ? i->ratio_max : NAN);
+  if (used) {
+    cli_report_count(r, "points_certified", i->certified_points);
+    cli_report_count(r, "reduce_rounds", i->rounds);
+  } else {
+    cli_report_null(r, "points_certified");
+    cli_report_null(r, "reduce_rounds");
+  }
+  cli_report_number(r, "time_certify_s", used ? i->time_certify_s : NAN);
+}
+
 static void report_fit(const solid_work *w, cli_report *r) {
   const batten_solid_info *i = &w->info;
   const batten_saddle_info *s = &i->spline.saddle;
@@ -58,6 +76,8 @@ static void report_fit(const solid_work *w, cli_report *r) {
   cli_report_text(r, "carrier", carrier_name(w));
   cli_report_count(r, "order", parts.m);
   cli_report_number(r, "smoothing", w->request->fit.spline.smoothing);
+  cli_report_count(r, "centers", parts.count);
+  report_reduction(w, r);
   cli_report_text(r, "method", batten_saddle_method_name(s->method));
   cli_report_count(r, "fallbacks", s->fallbacks);
   report_iteration(w, r);
@@ -129,6 +149,9 @@ void solid_summary(const solid_work *w) {
   if (!isnan(i->spline.loo_rms)) snprintf(loo, sizeof loo, ", leave-one-out %.2e", i->spline.loo_rms);
   cli_line("solid", "carrier %s, solver %s, residual %.1e%s", carrier_name(w),
            batten_saddle_method_name(i->spline.saddle.method), i->residual_max, loo);
+  if (w->request->fit.reduce > 0)
+    cli_line("centres", "%zu of the points, the surface within %.3g of %s", i->reduced.centers,
+             i->reduced.error_certified, i->reduced.certified_points == i->points_used ? "all" : "all, by fast sums");
   cli_line("sign", "%s%s%s", sign_name(i->sign), i->orientation == BATTEN_ORIENTATION_NONE ? "" : ", orientation ",
            i->orientation == BATTEN_ORIENTATION_NONE ? "" : orientation_name(i->orientation));
   body_print(&w->body);

@@ -178,6 +178,15 @@ is u.json method iterative
 holds u.json accuracy 'x == 1e-8'
 holds u.json residual_rows 'x <= 1e-8'
 holds u.json iterations 'x >= 1'
+is u.json reduce None
+is u.json points_certified None
+run 0 "" solid s.csv --report u.json --quiet --reduce 0.05 --save few-centres.json --cell 0.4
+holds u.json reduce 'x == 0.05'
+holds u.json distance_certified 'x > 0 && x <= 0.05'
+holds u.json reduce_ratio 'x <= 1'
+holds u.json points_certified "x == $(figure u.json points_used)"
+holds u.json centers "x < 0.7 * $(figure u.json points_used)"
+run 2 "--reduce" solid s.csv --reduce -1
 run 0 "warning: the surface reaches its box and is cut there; enlarge --box" solid s.csv --report u.json --quiet --box 1,-8,-2,6,-2,1.5
 is u.json status clipped
 is u.json mesh_closed False
