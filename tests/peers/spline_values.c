@@ -1,5 +1,6 @@
-/* For compare_scipy.py: reads "n m smoothing N Q", N rows of coordinates and value, and Q rows of coordinates; prints
- * U at the Q points. smoothing is SciPy's: in the points' own unit, not in the unit box. */
+/* For compare_scipy.py: reads "n m smoothing accuracy N Q", N rows of coordinates and value, and Q rows of
+ * coordinates; prints U at the Q points. smoothing is SciPy's: in the points' own unit, not in the unit box. accuracy
+ * 0: by factors; above: by iteration to that, and U by fast sums. */
 #include <batten/batten.h>
 #include <math.h>
 #include <stdio.h>
@@ -13,9 +14,11 @@ static int read_numbers(double *out, size_t count) {
 
 /* batten adds its rho in the unit box, whose size the first fit tells: K scales with its power 2m - n. */
 static batten_status fit(batten_context *ctx, const batten_spline_data *data, unsigned m, double smoothing,
-                         batten_spline **out) {
+                         double accuracy, batten_spline **out) {
   batten_spline_options o = batten_spline_options_default();
   o.m = m;
+  if (accuracy > 0) o.saddle.method = BATTEN_SADDLE_ITERATIVE, o.saddle.accuracy = accuracy;
+  if (smoothing == 0) return batten_spline_fit(ctx, data, &o, out, NULL);
   batten_spline *plain = NULL;
   batten_status status = batten_spline_fit(ctx, data, &o, &plain, NULL);
   if (status < 0) return status;
@@ -26,11 +29,22 @@ static batten_status fit(batten_context *ctx, const batten_spline_data *data, un
   return batten_spline_fit(ctx, data, &o, out, NULL);
 }
 
+static batten_status evaluate(batten_context *ctx, batten_spline *s, double accuracy, size_t count, const double *at,
+                              double *out) {
+  if (!(accuracy > 0)) return batten_spline_evaluate(ctx, s, count, at, out, NULL, NULL);
+  batten_spline_evaluator *e = NULL;
+  batten_status status = batten_spline_evaluator_new(ctx, s, 0.1 * accuracy, &e);
+  if (status >= 0) status = batten_spline_evaluator_evaluate(ctx, e, count, at, out, NULL, NULL);
+  batten_spline_evaluator_free(e);
+  return status;
+}
+
 int main(void) {
   unsigned n, m;
   size_t count, queries;
-  double smoothing;
-  if (scanf("%u %u %lf %zu %zu", &n, &m, &smoothing, &count, &queries) != 5 || n < 1 || n > 3) return 2;
+  double smoothing, accuracy;
+  if (scanf("%u %u %lf %lf %zu %zu", &n, &m, &smoothing, &accuracy, &count, &queries) != 6 || n < 1 || n > 3)
+    return 2;
   double *rows = malloc(count * (n + 1) * sizeof *rows), *points = malloc(count * n * sizeof *points);
   double *values = malloc(count * sizeof *values), *at = malloc(queries * n * sizeof *at);
   double *result = malloc(queries * sizeof *result);
@@ -46,8 +60,8 @@ int main(void) {
   batten_spline_data data = batten_spline_data_default();
   data.n = n, data.count = count, data.points = points, data.values = values;
   batten_spline *spline = NULL;
-  batten_status status = fit(ctx, &data, m, smoothing, &spline);
-  if (status >= 0) status = batten_spline_evaluate(ctx, spline, queries, at, result, NULL, NULL);
+  batten_status status = fit(ctx, &data, m, smoothing, accuracy, &spline);
+  if (status >= 0) status = evaluate(ctx, spline, accuracy, queries, at, result);
   if (status < 0) fprintf(stderr, "%s\n", batten_error(ctx));
   for (size_t i = 0; status >= 0 && i < queries; i++) printf("%.17g\n", result[i]);
   batten_spline_free(spline);
