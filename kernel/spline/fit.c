@@ -41,14 +41,15 @@ batten_spline_options batten_spline_options_default(void) {
                                  .saddle = batten_saddle_options_default()};
 }
 
-/* Of the iterative solver with its products with K: more accurate than what is asked for by a factor of 20, or 1e-11
- * with smooth kernels. Those of its levels, whose points fall off by four or more from one to the next, take about as
- * much again as the main one. */
+/* Of the iterative solver with its products with K: more accurate than what is asked for by a factor of 20, or of 400
+ * and 5e-10 (1e-11 of many points) with smooth kernels. Those of its levels, whose points fall off by four or more
+ * from one to the next, take about as much again as the main one. */
 static size_t iterative_bytes(unsigned n, unsigned m, size_t points, size_t gradients, double accuracy) {
   size_t rows, sums, bytes, total;
   batten_mul(n, gradients, &rows);
   batten_add(rows, points, &rows);
-  const double products = batten_green_power(n, m) > 1 ? fmin(accuracy / 20, 1e-11) : accuracy / 20;
+  const double smooth = fmin(accuracy / 400, rows > 150000 ? 1e-11 : 5e-10);
+  const double products = batten_green_power(n, m) > 1 ? smooth : accuracy / 20;
   batten_mul(2, batten_spline_sums_bytes(n, m, points, gradients, products), &sums);
   bytes = batten_saddle_bytes(BATTEN_SADDLE_ITERATIVE, rows, batten_polynomial_count(n, m - 1));
   return batten_add(bytes, sums, &total) ? total : SIZE_MAX;

@@ -21,14 +21,17 @@ static size_t leaf_points(unsigned n, unsigned order) {
 }
 
 /* Whether terms summed directly cost less than what is left of them and the far fields. In units of a term of near.c
- * (0.4 ns): an operation of a small product costs a fortieth of it, those of polynomials an eighth. */
-static bool is_direct_cheaper(const batten_fmm *f, fmm_orders orders) {
+ * (0.4 ns): an operation of a small product costs a fortieth of it, those of polynomials an eighth. Operators that
+ * have to be made are thought to serve PRODUCTS times. */
+static bool is_direct_cheaper(const batten_fmm *f, fmm_orders orders, bool shared) {
+  enum { PRODUCTS = 20 };
   const double order = orders.order, n = f->kernel.n, full = pow(order, n),
-               rank = (double)batten_fmm_rank_guess(f->kernel.n, orders.order);
+               rank = (double)batten_fmm_rank_guess(&f->kernel, orders.order);
   const double translations = (double)f->lists.kind_begin[f->lists.chunks * FMM_KINDS];
   const double points = (double)f->tree.sources.count + (double)f->tree.targets.count;
   const double fast = (double)f->lists.pairs + (double)f->lists.node_terms + translations * 2 * rank * rank / 40 +
-                      (points * 2 * full + (double)f->tree.cells * 8 * n * full * order) / 8;
+                      (points * 2 * full + (double)f->tree.cells * 8 * n * full * order) / 8 +
+                      (shared ? 0 : (n == 2 ? 7 : 16) * 2 * full * full * rank / 40 / PRODUCTS);
   return (double)f->sources.count * (double)f->targets.count < fast;
 }
 
@@ -46,7 +49,7 @@ static batten_status copy_points(batten_context *ctx, unsigned n, size_t count, 
 }
 
 /* Tree and lists, unless direct sums are cheaper; f->tree.cells = 0 then. */
-static batten_status plan_tree(batten_context *ctx, batten_fmm *f, fmm_orders orders) {
+static batten_status plan_tree(batten_context *ctx, batten_fmm *f, fmm_orders orders, bool shared) {
   const unsigned n = f->kernel.n;
   if ((double)f->sources.count * (double)f->targets.count <= DIRECT_TERMS) return BATTEN_OK;
   if (f->sources.count > UINT32_MAX || f->targets.count > UINT32_MAX)
@@ -58,7 +61,7 @@ static batten_status plan_tree(batten_context *ctx, batten_fmm *f, fmm_orders or
       batten_fmm_tree_new(ctx, n, &f->sources, &f->targets, f->same, leaf_points(n, orders.order), &f->tree);
   if (st < 0) return st;
   if ((st = batten_fmm_lists_new(ctx, n, full, &f->tree, &f->lists)) < 0) return st;
-  if (!is_direct_cheaper(f, orders)) return BATTEN_OK;
+  if (!is_direct_cheaper(f, orders, shared)) return BATTEN_OK;
   batten_fmm_lists_free(ctx, &f->lists);
   batten_fmm_tree_free(ctx, &f->tree);
   return BATTEN_OK;
@@ -114,7 +117,7 @@ batten_status batten_fmm_create(batten_context *ctx, const batten_radial *kernel
   } else if ((st = copy_points(ctx, kernel->n, target_count, targets, &f->targets)) < 0) {
     goto done;
   }
-  if ((st = plan_tree(ctx, f, orders)) < 0) goto done;
+  if ((st = plan_tree(ctx, f, orders, options.share && options.share->operators)) < 0) goto done;
   if (f->tree.cells) {
     if ((st = plan_operators(ctx, f, orders, options.share)) < 0) goto done;
     if ((st = batten_fmm_work_new(ctx, f)) < 0) goto done;
@@ -204,16 +207,6 @@ static size_t times(size_t a, size_t b) {
   return product;
 }
 
-/* Operators, what they are made in, and their copies for each level where the kernel has a logarithm. */
-static size_t operator_doubles(const batten_radial *kernel, fmm_orders orders, size_t full, size_t levels) {
-  const size_t n = kernel->n, kinds = n == 2 ? 12 : 56, half = (orders.order + 1) / 2;
-  const size_t rank = batten_fmm_rank_guess(kernel->n, orders.order), stride = rank + FMM_PANEL;
-  const size_t transfers = kinds * stride * rank, samples = (6 * (n == 2 ? half * half : half * half * half) + kinds);
-  const size_t sampling = samples * (kernel->logarithm ? 2 : 1) * 3 * full,
-               making = 2 * stride * full + 8 * 90 * full;
-  return transfers * (kernel->logarithm ? 2 + levels : 1) + (sampling > making ? sampling : making);
-}
-
 size_t batten_fmm_bytes(const batten_radial *kernel, size_t source_count, size_t target_count,
                         const batten_fmm_options *opt) {
   const batten_fmm_options o = opt ? *opt : batten_fmm_options_default();
@@ -226,7 +219,7 @@ size_t batten_fmm_bytes(const batten_radial *kernel, size_t source_count, size_t
   const fmm_orders orders = batten_fmm_orders(kernel, o.accuracy, o.gradients || o.dipoles);
   const size_t leaf = leaf_points(kernel->n, orders.order),
                full = n == 2 ? orders.order * orders.order : orders.order * orders.order * orders.order;
-  const size_t stride = batten_fmm_rank_guess(kernel->n, orders.order) + FMM_PANEL;
+  const size_t rank = batten_fmm_rank_guess(kernel, orders.order), stride = rank + FMM_PANEL;
   const size_t of_tree = source_count == target_count ? source_count : points; /* one cloud as a rule, or two */
   const size_t cells = plus(times(of_tree / leaf, leaf_split), 64);
   const size_t lists = n == 2 ? 27 * sizeof(fmm_translation) + 9 * 4 : 189 * sizeof(fmm_translation) + 27 * 4;
@@ -235,6 +228,9 @@ size_t batten_fmm_bytes(const batten_radial *kernel, size_t source_count, size_t
   size_t levels = 2;
   for (size_t left = of_tree / leaf; left > 1; left /= 4) levels++;
   bytes = plus(bytes, times(cells, each));
-  bytes = plus(bytes, times(operator_doubles(kernel, orders, full, levels), sizeof(double)));
-  return plus(bytes, (size_t)FMM_GROUP * (6 * full + 96 * stride) * sizeof(double));
+  /* Scratch of a pass, and copies of the transfers for each level where the kernel has a logarithm. */
+  const size_t across = 96 * stride, others = 7 * full, kinds = n == 2 ? 12 : 56,
+               copies = kernel->logarithm ? levels * kinds * stride * rank : 0;
+  const size_t later = (size_t)FMM_GROUP * (across > others ? across : others) + copies;
+  return plus(bytes, batten_fmm_operator_bytes(kernel, orders, later));
 }

@@ -62,8 +62,10 @@ typedef struct fmm_orders {
   double cut;
 } fmm_orders;
 fmm_orders batten_fmm_orders(const batten_radial *kernel, double accuracy, bool derivatives);
-/* What the rank will be, roughly. */
-size_t batten_fmm_rank_guess(unsigned n, unsigned order);
+/* What the rank will be at most, roughly. */
+size_t batten_fmm_rank_guess(const batten_radial *kernel, unsigned order);
+/* Bytes of operators at the peak: while they are made, or later with `beside` numbers of somebody else. */
+size_t batten_fmm_operator_bytes(const batten_radial *kernel, fmm_orders orders, size_t beside);
 
 batten_status batten_fmm_operators_new(batten_context *ctx, const batten_radial *kernel, fmm_orders orders,
                                        fmm_operators **out);

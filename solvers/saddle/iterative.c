@@ -10,16 +10,19 @@
 #include "base/arena.h"
 #include "schwarz.h"
 
-/* Products are the better for a margin: their error counts by |K w|, which is some ten times |Pi f|. */
-static const double PRODUCTS_MARGIN = 20;
+/* Products are the better for a margin: their error counts by |K w|, which is some ten times |Pi f| with the kernel
+ * r, and with r^3 some 200 times at 20,000 unknowns. */
+static const double PRODUCTS_MARGIN = 20, PRODUCTS_MARGIN_SMOOTH = 400;
 
 /* The iteration goes on to this part of the accuracy, so that the products' error finds room beside. */
 static const double ITERATION_MARGIN = 0.5;
 
 /* Of products: what double can give, and what the levels need. Errors there are rough at the size of a cell, which
  * K^-1 amplifies: measured with the kernel r, iterations to 1e-9 of 40,000 and to 1e-6 of 1,000,000 unknowns with
- * errors of 2e-3, 2e-4, 2e-5, 2e-7: more than 30, 11, 7, 9; and -, -, 19, 7. Smooth kernels stall below 1e-10. */
-static const double FLOOR = 1e-13, WITHIN_SMALL = 2e-5, WITHIN_LARGE = 2e-7, WITHIN_SMOOTH = 1e-11;
+ * errors of 2e-3, 2e-4, 2e-5, 2e-7: more than 30, 11, 7, 9; and -, -, 19, 7. With r^3, to 5e-9 of 20,000: 9 with
+ * errors of 1e-11 and of 5e-10. */
+static const double FLOOR = 1e-13, WITHIN_SMALL = 2e-5, WITHIN_LARGE = 2e-7;
+static const double SMOOTH_SMALL = 5e-10, SMOOTH_LARGE = 1e-11;
 enum { LARGE = 150000 };
 
 enum { ROWS_CHECKED = 1000, STEPS_EXPECTED = 24 };
@@ -28,18 +31,22 @@ static double overlap_of(const batten_saddle_options *o) {
   return o->overlap > 0 ? o->overlap : o->smooth_kernel ? 1 : 0.5;
 }
 
-static double first_accuracy(const batten_saddle_options *o) {
-  if (o->products_accuracy > 0) return fmax(o->products_accuracy, FLOOR);
-  double wanted = fmax(o->accuracy / PRODUCTS_MARGIN, FLOOR);
-  return o->smooth_kernel ? fmin(wanted, WITHIN_SMOOTH) : wanted;
+static double needed_within(const batten_saddle_options *o, size_t n) {
+  if (o->smooth_kernel) return n > LARGE ? SMOOTH_LARGE : SMOOTH_SMALL;
+  return n > LARGE ? WITHIN_LARGE : WITHIN_SMALL;
 }
 
-/* Where it is not much coarser than what the iteration itself takes, the same: plans may share what is dear to make.
- */
+static double first_accuracy(const batten_saddle_options *o, size_t n) {
+  if (o->products_accuracy > 0) return fmax(o->products_accuracy, FLOOR);
+  double wanted = fmax(o->accuracy / (o->smooth_kernel ? PRODUCTS_MARGIN_SMOOTH : PRODUCTS_MARGIN), FLOOR);
+  return o->smooth_kernel ? fmin(wanted, needed_within(o, n)) : wanted;
+}
+
+/* Where it is not much coarser than what the iteration itself takes, the same: plans may share what is dear to make,
+ * and the dearer the smoother the kernel. */
 static double accuracy_within(const batten_saddle_options *o, size_t n) {
-  double wanted = o->smooth_kernel ? WITHIN_SMOOTH : n > LARGE ? WITHIN_LARGE : WITHIN_SMALL;
-  double first = first_accuracy(o);
-  return first <= wanted && first >= 0.1 * wanted ? first : wanted;
+  const double wanted = needed_within(o, n), first = first_accuracy(o, n);
+  return first <= wanted && first >= (o->smooth_kernel ? 0.01 : 0.1) * wanted ? first : wanted;
 }
 
 /* ---- Memory ---- */
@@ -84,7 +91,7 @@ static size_t bytes_with(const batten_saddle_matrix *m, const batten_saddle_opti
     batten_add(held, plan_bytes(m, accuracy_within(o, n), count, next), &held);
     count = next;
   }
-  batten_add(held, plan_bytes(m, first_accuracy(o), n, n), &held);
+  batten_add(held, plan_bytes(m, first_accuracy(o, n), n, n), &held);
   grow(&held, slots, batten_saddle_domain_scratch(most));
   size_t exact = batten_saddle_bytes(BATTEN_SADDLE_CHOLESKY, count, k < count ? k : 0), peak = cutting;
   size_t work = slots * batten_saddle_domain_work(most, k), solving = 0;
@@ -187,7 +194,7 @@ batten_status batten_saddle_iterative_new(batten_saddle *s) {
   if (st < 0) goto done;
   st = batten_saddle_links_new(s, it, accuracy_within(&s->options, n));
   if (st < 0) goto done;
-  if (n > 0) st = plan_products(s, it, first_accuracy(&s->options));
+  if (n > 0) st = plan_products(s, it, first_accuracy(&s->options, n));
   if (st < 0) goto done;
   count_domains(s, it, before);
   s->info.time_setup_s = batten_now() - start;

@@ -61,7 +61,8 @@ int main(void) {
   for (size_t i = 1; i < 5; i++) check(&kernels[i], 20000, 0, 1e-8, true), check(&kernels[i], 20000, 0, 1e-11, false);
   check(&kernels[7], 30000, 0, 1e-6, false);
   check(&kernels[7], 30000, 0, 1e-8, false);
-  check(&kernels[9], 40000, 0, 1e-9, false);
+  check(&kernels[9], 25000, 0, 1e-10, false);
+  check(&kernels[9], 20000, 0, 1e-8, true);
   check(&kernels[9], 20000, 0, 1e-6, true);
   check(&kernels[7], 60000, 4000, 1e-4, true);
   check(&kernels[7], 4000, 60000, 1e-4, true);

@@ -211,19 +211,30 @@ static void test_same_bits(void) {
 
 /* What is told before is not far from what is taken. */
 static void test_bytes(void) {
-  for (int kind = 0; kind < 4; kind++) {
+  static const struct {
+    fmm_place place;
+    batten_radial kernel;
+    double accuracy;
+    bool derivatives;
+  } cases[] = {{PLACE_VOLUME, {3, 1, 0}, 1e-6, false},  {PLACE_SURFACE, {3, 1, 0}, 1e-6, false},
+               {PLACE_SURFACE, {3, 1, 0}, 1e-3, false}, {PLACE_SURFACE, {3, 3, 0}, 1e-8, false},
+               {PLACE_VOLUME, {3, 5, 0}, 1e-6, true},   {PLACE_VOLUME, {2, 2, 1}, 1e-6, false},
+               {PLACE_SURFACE, {2, 2, 1}, 1e-6, false}, {PLACE_VOLUME, {2, 1, 0}, 1e-11, false},
+               {PLACE_VOLUME, {2, 4, 1}, 1e-12, true},  {PLACE_VOLUME, {2, 7, 0}, 1e-9, false}};
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
     const size_t count = 40000;
-    fmm_scene s = fmm_scene_new(kind & 1 ? PLACE_SURFACE : PLACE_VOLUME, kind & 2 ? 2 : 3, count, 0, 1);
-    const batten_fmm_options o = options(1e-6, 0);
+    const batten_radial *k = &cases[i].kernel;
+    fmm_scene s = fmm_scene_new(cases[i].place, k->n, count, 0, 1);
+    batten_fmm_options o = options(cases[i].accuracy, 0);
+    o.gradients = o.dipoles = cases[i].derivatives;
     batten_fmm *f = NULL;
-    const batten_radial *k = kind & 2 ? &thin_plate : &biharmonic;
     const size_t told = batten_fmm_bytes(k, count, count, &o), before = batten_bytes_in_use(ctx);
     batten_bytes_peak_reset(ctx);
     T_OK(batten_fmm_create(ctx, k, count, s.y, count, NULL, &o, &f), ctx);
-    T_OK(batten_fmm_apply(ctx, f, s.w, NULL, s.u, NULL), ctx);
+    T_OK(batten_fmm_apply(ctx, f, s.w, o.dipoles ? s.g : NULL, s.u, o.gradients ? s.du : NULL), ctx);
     const double peak = (double)(batten_bytes_peak(ctx) - before);
-    T_CHECK(peak <= (double)told && (double)told < 4 * peak, "%u-D: %.3g bytes taken, %.3g told", s.n, peak,
-            (double)told);
+    T_CHECK(peak <= (double)told && (double)told < 4 * peak, "%u-D, r^%d, %g: %.3g bytes taken, %.3g told", s.n,
+            k->power, cases[i].accuracy, peak, (double)told);
     batten_fmm_free(f);
     fmm_scene_free(&s);
   }
