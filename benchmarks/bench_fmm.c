@@ -66,8 +66,12 @@ int main(int argc, char **argv) {
   static const struct {
     const char *name;
     batten_radial kernel;
-  } kernels[] = {{"r, bumpy sphere", {3, 1, 0}}, {"r^3, bumpy sphere", {3, 3, 0}}, {"r^2 ln r, square", {2, 2, 1}}};
-  static const double accuracies[] = {1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10};
+  } kernels[] = {{"r, bumpy sphere", {3, 1, 0}},
+                 {"r^3, bumpy sphere", {3, 3, 0}},
+                 {"r^5, bumpy sphere", {3, 5, 0}},
+                 {"r^2 ln r, square", {2, 2, 1}},
+                 {"r^4 ln r, square", {2, 4, 1}}};
+  static const double accuracies[] = {1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12};
   static const size_t usual[] = {10000, 40000, 100000};
   const size_t counts = argc > 1 ? (size_t)argc - 1 : sizeof usual / sizeof *usual;
   batten_context_options co = batten_context_options_default();
