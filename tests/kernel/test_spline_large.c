@@ -208,8 +208,7 @@ static void test_smooth(batten_context *ctx) {
   print("r^3, products of 1e-5 at first", d.count, batten_now() - start, &info);
   T_CHECK(info.saddle.products_accuracy < 1e-6, "r^3: products of %g in the end", info.saddle.products_accuracy);
   T_RATIO(info.saddle.residual_rows, 1e-6, "r^3, coarse products at first: residual");
-  /* Gradients: on a surface as a solid has them, and in a volume, where domains of as many unknowns reach less far.
-   */
+  /* Gradients: on a surface as a solid has them, and in a volume. */
   for (int volume = 0; volume < 2; volume++) {
     d = data_of(volume ? &few : &c, true);
     d.count = d.gradient_count = 2000;
