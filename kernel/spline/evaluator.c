@@ -1,8 +1,5 @@
 /* Values and gradients of a spline at many points, in time that grows with the number of centres and points and not
- * with their product.
- *
- * The sum over the centres is a fast multipole sum, the polynomial is added to it. Each batch is planned anew; the
- * last plan is kept, since the next one can use its operators. */
+ * with their product: the sum over the centres is that of an evaluator of <batten/fmm.h>, the polynomial is added. */
 #include "spline/inner.h"
 
 #include "base/checked.h"
@@ -13,14 +10,33 @@
 struct batten_spline_evaluator {
   batten_context *ctx;
   batten_spline *spline; /* retained */
-  batten_radial kernel;
-  double accuracy;
-  double *centers;     /* [N][n] in the unit box, as the terms have them */
-  double *dipoles;     /* [N][n]; NULL without gradient terms */
-  batten_fmm *last[2]; /* without and with gradients; NULL before the first batch */
+  batten_fmm_evaluator *sums;
 };
 
-static size_t centre_count(const batten_spline *s) { return s->terms.plain + s->terms.hermite; }
+/* The terms as sources: in the unit box, those without gradients with dipoles of 0 where others have them. */
+static batten_status make_sums(batten_context *ctx, const spline_terms *t, double accuracy,
+                               batten_fmm_evaluator **out) {
+  const size_t n = t->n, count = t->plain + t->hermite;
+  const batten_radial kernel = {.n = t->n, .power = (int)t->power, .logarithm = t->power % 2 == 0};
+  batten_fmm_options o = batten_fmm_options_default();
+  o.accuracy = accuracy;
+  o.gradients = 1;
+  o.dipoles = t->hermite > 0;
+  batten_status st = BATTEN_E_NOMEM;
+  double *dipoles = NULL, *centers = batten_alloc_array(ctx, count, n * sizeof *centers);
+  if (!centers) goto done;
+  if (o.dipoles && !(dipoles = batten_alloc_array(ctx, count, n * sizeof *dipoles))) goto done;
+  for (size_t j = 0; j < count; j++)
+    for (size_t a = 0; a < n; a++) {
+      centers[j * n + a] = t->x[a][j];
+      if (dipoles) dipoles[j * n + a] = j < t->plain ? 0 : t->g[a][j - t->plain];
+    }
+  st = batten_fmm_evaluator_new(ctx, &kernel, count, centers, t->w, dipoles, &o, out);
+done:
+  batten_free(ctx, dipoles);
+  batten_free(ctx, centers);
+  return st;
+}
 
 batten_status batten_spline_evaluator_new(batten_context *ctx, batten_spline *s, double accuracy,
                                           batten_spline_evaluator **out) {
@@ -28,33 +44,17 @@ batten_status batten_spline_evaluator_new(batten_context *ctx, batten_spline *s,
   if (!s || !out) return batten_fail(ctx, BATTEN_E_INVALID, "%s: NULL", s ? "out" : "s");
   if (!(accuracy >= 1e-12 && accuracy <= 1e-3))
     return batten_fail(ctx, BATTEN_E_INVALID, "accuracy: %g; must be 1e-12 .. 1e-3", accuracy);
-  const size_t n = s->parts.n, count = centre_count(s);
-  if (n < 2)
+  if (s->parts.n < 2)
     return batten_fail(ctx, BATTEN_E_INVALID,
                        "s: of one dimension, for which there are no fast sums; use "
                        "batten_spline_evaluate()");
   batten_status st = BATTEN_E_NOMEM;
   batten_spline_evaluator *e = batten_alloc(ctx, sizeof *e);
   if (!e) goto done;
-  const int power = (int)s->terms.power;
-  *e = (batten_spline_evaluator){.ctx = ctx,
-                                 .spline = batten_spline_retain(s),
-                                 .kernel = {.n = s->parts.n, .power = power, .logarithm = power % 2 == 0},
-                                 .accuracy = accuracy};
-  e->centers = batten_alloc_array(ctx, count, n * sizeof *e->centers);
-  if (!e->centers) goto done;
-  for (size_t j = 0; j < count; j++)
-    for (size_t a = 0; a < n; a++) e->centers[j * n + a] = s->terms.x[a][j];
-  if (s->terms.hermite) {
-    e->dipoles = batten_alloc_array(ctx, count, n * sizeof *e->dipoles);
-    if (!e->dipoles) goto done;
-    for (size_t j = 0; j < count; j++)
-      for (size_t a = 0; a < n; a++)
-        e->dipoles[j * n + a] = j < s->terms.plain ? 0 : s->terms.g[a][j - s->terms.plain];
-  }
+  *e = (batten_spline_evaluator){.ctx = ctx, .spline = batten_spline_retain(s)};
+  if ((st = make_sums(ctx, &s->terms, accuracy, &e->sums)) < 0) goto done;
   *out = e;
   e = NULL;
-  st = BATTEN_OK;
 done:
   batten_spline_evaluator_free(e);
   return st;
@@ -62,26 +62,9 @@ done:
 
 void batten_spline_evaluator_free(batten_spline_evaluator *e) {
   if (!e) return;
-  for (int i = 0; i < 2; i++) batten_fmm_free(e->last[i]);
-  batten_free(e->ctx, e->dipoles);
-  batten_free(e->ctx, e->centers);
+  batten_fmm_evaluator_free(e->sums);
   batten_spline_free(e->spline);
   batten_free(e->ctx, e);
-}
-
-/* Plans the sums at y [count][n], in place of the plan before. */
-static batten_status plan(batten_spline_evaluator *e, size_t count, const double *y, bool gradients) {
-  batten_fmm_options o = batten_fmm_options_default();
-  batten_fmm *made = NULL;
-  o.accuracy = e->accuracy;
-  o.gradients = gradients;
-  o.dipoles = e->dipoles != NULL;
-  o.share = e->last[gradients];
-  batten_status st = batten_fmm_create(e->ctx, &e->kernel, centre_count(e->spline), e->centers, count, y, &o, &made);
-  if (st < 0) return st;
-  batten_fmm_free(e->last[gradients]);
-  e->last[gradients] = made;
-  return BATTEN_OK;
 }
 
 /* u [count] and g [count][n] hold the sums; they become U and its gradient. */
@@ -98,17 +81,31 @@ static void add_polynomial(const batten_spline *s, size_t count, const double *y
 
 enum { CHECKED = 100 }; /* points whose values are summed directly too */
 
-/* The largest error of u at some points, evenly drawn. */
-static batten_status find_error(const batten_spline_evaluator *e, size_t count, const double *points, const double *u,
-                                double *error) {
-  const size_t n = e->spline->parts.n, checked = count < CHECKED ? count : CHECKED;
-  double x[3 * CHECKED] = {0}, direct[CHECKED], worst = 0;
-  for (size_t q = 0; q < checked; q++)
-    for (size_t a = 0; a < n; a++) x[q * n + a] = points[(q * (count / checked)) * n + a];
-  batten_status st = batten_spline_evaluate(e->ctx, e->spline, checked, x, direct, NULL, NULL);
-  if (st < 0) return st;
-  for (size_t q = 0; q < checked; q++) worst = fmax(worst, fabs(u[q * (count / checked)] - direct[q]));
-  *error = worst;
+/* Up to CHECKED points, evenly drawn. */
+static size_t checked_count(size_t count) { return count < CHECKED ? count : CHECKED; }
+static size_t checked_point(size_t count, size_t q) { return q * (count / checked_count(count)); }
+
+/* direct [CHECKED]: the values there by batten_spline_evaluate(). */
+static batten_status sum_checked(const batten_spline_evaluator *e, size_t count, const double *points,
+                                 double *direct) {
+  const size_t n = e->spline->parts.n;
+  double x[3 * CHECKED] = {0};
+  for (size_t q = 0; q < checked_count(count); q++)
+    for (size_t a = 0; a < n; a++) x[q * n + a] = points[checked_point(count, q) * n + a];
+  return batten_spline_evaluate(e->ctx, e->spline, checked_count(count), x, direct, NULL, NULL);
+}
+
+/* y [count][n] in the unit box. */
+static batten_status take_to_box(batten_context *ctx, const batten_spline_parts *p, size_t count,
+                                 const double *points, double *y) {
+  const size_t n = p->n;
+  for (size_t i = 0; i < count * n; i++) {
+    y[i] = spline_to_box(points[i], p->origin[i % n], p->scale);
+    if (!(fabs(y[i]) < 1e30))
+      return batten_fail(ctx, BATTEN_E_INVALID,
+                         "points[%zu][%zu]: %g; must be finite and within 1e30 boxes of the centres", i / n, i % n,
+                         points[i]);
+  }
   return BATTEN_OK;
 }
 
@@ -120,36 +117,22 @@ batten_status batten_spline_evaluator_evaluate(batten_context *ctx, batten_splin
   if (e->ctx != ctx)
     return batten_fail(ctx, BATTEN_E_INVALID, "e: made with another context; pass the one it was made with");
   if (count && !points) return batten_fail(ctx, BATTEN_E_INVALID, "points: NULL with count = %zu", count);
-  const batten_spline_parts *p = &e->spline->parts;
-  const size_t n = p->n;
-  double *g = NULL, error = 0;
+  const size_t n = e->spline->parts.n;
+  double direct[CHECKED], error = 0, *spare = NULL, *u = values;
   batten_status st = BATTEN_E_NOMEM;
-  double *y = batten_alloc_array(ctx, count, (n + 1) * sizeof *y); /* y [count][n], u [count] */
+  double *y = batten_alloc_array(ctx, count, n * sizeof *y);
   if (!y) goto done;
-  double *u = y + count * n;
-  if (gradients) {
-    g = batten_alloc_array(ctx, count, n * sizeof *g);
-    if (!g) goto done;
-  }
-  for (size_t i = 0; i < count * n; i++) {
-    y[i] = spline_to_box(points[i], p->origin[i % n], p->scale);
-    if (fabs(y[i]) < 1e30) continue;
-    st = batten_fail(ctx, BATTEN_E_INVALID,
-                     "points[%zu][%zu]: %g; must be finite and within 1e30 boxes of the centres", i / n, i % n,
-                     points[i]);
-    goto done;
-  }
-  if ((st = plan(e, count, y, gradients != NULL)) < 0) goto done;
-  st = batten_fmm_apply(ctx, e->last[gradients != NULL], e->spline->terms.w, e->dipoles, u, g);
-  if (st < 0) goto done;
-  add_polynomial(e->spline, count, y, u, g);
-  if (value_error && count) st = find_error(e, count, points, u, &error);
-  if (st < 0) goto done;
-  for (size_t i = 0; i < count && values; i++) values[i] = u[i];
-  for (size_t i = 0; i < count * n && gradients; i++) gradients[i] = g[i];
+  if (!values && !(u = spare = batten_alloc_array(ctx, count, sizeof *spare))) goto done;
+  if ((st = take_to_box(ctx, &e->spline->parts, count, points, y)) < 0) goto done;
+  if (value_error && (st = sum_checked(e, count, points, direct)) < 0) goto done;
+  /* The last that can fail: it leaves values and gradients as they were. */
+  if ((st = batten_fmm_evaluator_evaluate(ctx, e->sums, count, y, u, gradients)) < 0) goto done;
+  add_polynomial(e->spline, count, y, u, gradients);
+  for (size_t q = 0; q < checked_count(count) && value_error; q++)
+    error = fmax(error, fabs(u[checked_point(count, q)] - direct[q]));
   if (value_error) *value_error = error;
 done:
-  batten_free(ctx, g);
+  batten_free(ctx, spare);
   batten_free(ctx, y);
   return st;
 }

@@ -39,8 +39,8 @@ static batten_status check_options(batten_context *ctx, const batten_radial *ker
   return BATTEN_OK;
 }
 
-static batten_status check_points(batten_context *ctx, const char *name, unsigned n, size_t count,
-                                  const double *points) {
+batten_status batten_fmm_check_points(batten_context *ctx, const char *name, unsigned n, size_t count,
+                                      const double *points) {
   size_t doubles;
   if (!batten_mul3(count, n, 16 * sizeof(double), &doubles)) /* 16: more than the plan keeps for a coordinate */
     return batten_fail(ctx, BATTEN_E_TOO_LARGE, "%s: %zu points", name, count);
@@ -59,8 +59,8 @@ batten_status batten_fmm_check_plan(batten_context *ctx, const batten_radial *ke
   batten_status st = check_kernel(ctx, kernel);
   if (st < 0) return st;
   if ((st = check_options(ctx, kernel, opt)) < 0) return st;
-  if ((st = check_points(ctx, "sources", kernel->n, source_count, sources)) < 0) return st;
-  if (targets) return check_points(ctx, "targets", kernel->n, target_count, targets);
+  if ((st = batten_fmm_check_points(ctx, "sources", kernel->n, source_count, sources)) < 0) return st;
+  if (targets) return batten_fmm_check_points(ctx, "targets", kernel->n, target_count, targets);
   if (target_count != source_count)
     return batten_fail(ctx, BATTEN_E_INVALID,
                        "target_count: %zu without targets; then the targets are the %zu sources, give that number",
@@ -68,15 +68,19 @@ batten_status batten_fmm_check_plan(batten_context *ctx, const batten_radial *ke
   return BATTEN_OK;
 }
 
-batten_status batten_fmm_check_weights(batten_context *ctx, const batten_fmm *fmm, const double *weights,
+batten_status batten_fmm_check_weights(batten_context *ctx, size_t n, size_t count, const double *weights,
                                        const double *dipoles) {
-  const size_t count = fmm->sources.count, n = fmm->kernel.n;
-  if (dipoles && !fmm->dipoles)
-    return batten_fail(ctx, BATTEN_E_INVALID, "dipoles: given to a plan without; set opt.dipoles when it is made");
   size_t i = weights ? batten_first_nonfinite(count, weights) : count;
   if (i < count) return batten_fail(ctx, BATTEN_E_INVALID, "weights[%zu]: %g; must be finite", i, weights[i]);
   i = dipoles ? batten_first_nonfinite(count * n, dipoles) : count * n;
   if (i < count * n)
     return batten_fail(ctx, BATTEN_E_INVALID, "dipoles[%zu][%zu]: %g; must be finite", i / n, i % n, dipoles[i]);
   return BATTEN_OK;
+}
+
+batten_status batten_fmm_check_terms(batten_context *ctx, const batten_fmm *fmm, const double *weights,
+                                     const double *dipoles) {
+  if (dipoles && !fmm->dipoles)
+    return batten_fail(ctx, BATTEN_E_INVALID, "dipoles: given to a plan without; set opt.dipoles when it is made");
+  return batten_fmm_check_weights(ctx, fmm->kernel.n, fmm->sources.count, weights, dipoles);
 }

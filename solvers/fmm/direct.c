@@ -43,13 +43,7 @@ batten_status batten_fmm_direct(batten_context *ctx, const batten_fmm *f, const 
   batten_status st = BATTEN_OK;
   double *block = batten_alloc_array(ctx, sources * (dipoles ? 1 + n : 1), sizeof *block);
   if (!block) return BATTEN_E_NOMEM;
-  for (unsigned a = 0; a < n; a++) d.terms.x[a] = f->sources.x[a];
-  for (size_t j = 0; j < sources; j++) block[j] = weights ? weights[j] : 0;
-  for (unsigned a = 0; a < n && dipoles; a++) {
-    for (size_t j = 0; j < sources; j++) block[(1 + a) * sources + j] = dipoles[j * n + a];
-    d.terms.g[a] = block + (1 + a) * sources;
-  }
-  d.terms.w = block;
+  batten_fmm_set_terms(&f->sources, NULL, (unsigned)n, sources, weights, dipoles, block, &d.terms);
   d.near = batten_fmm_lanes_now()->near((unsigned)n, (unsigned)f->kernel.power, gradients, dipoles != NULL);
   const size_t tasks = (d.count + TASK_TARGETS - 1) / TASK_TARGETS;
   const size_t piece = TERMS_PROGRESS / TASK_TARGETS / (sources ? sources : 1) + 1;
@@ -98,7 +92,7 @@ batten_status batten_fmm_error(batten_context *ctx, const batten_fmm *fmm, const
   if (!values != !value_error || !gradients != !gradient_error)
     return batten_fail(ctx, BATTEN_E_INVALID, "%s: NULL without the other of the pair; give both or none",
                        !values != !value_error ? "values, value_error" : "gradients, gradient_error");
-  batten_status st = batten_fmm_check_weights(ctx, fmm, weights, dipoles);
+  batten_status st = batten_fmm_check_terms(ctx, fmm, weights, dipoles);
   if (st < 0) return st;
   const size_t count = rows < fmm->targets.count ? rows : fmm->targets.count;
   size_t *at = batten_alloc_array(ctx, count, sizeof *at);

@@ -6,7 +6,8 @@
 #include <string.h>
 
 batten_fmm_options batten_fmm_options_default(void) {
-  return (batten_fmm_options){.struct_size = sizeof(batten_fmm_options), .accuracy = 1e-8};
+  return (batten_fmm_options){
+      .struct_size = sizeof(batten_fmm_options), .accuracy = 1e-8, .cache_bytes = (size_t)1 << 30};
 }
 
 /* ---- direct or fast ---- */
@@ -14,8 +15,7 @@ batten_fmm_options batten_fmm_options_default(void) {
 /* Terms below which a tree is not even tried: some hundredths of a second at most, and less than its set-up. */
 static const double DIRECT_TERMS = 4e6;
 
-/* Points of a leaf: as many as make direct sums cost about what the translations do. */
-static size_t leaf_points(unsigned n, unsigned order) {
+size_t batten_fmm_leaf_points(unsigned n, unsigned order) {
   if (n == 2) return 6 * (size_t)order;
   return order <= 6 ? 128 : order <= 8 ? 224 : 384;
 }
@@ -37,7 +37,8 @@ static bool is_direct_cheaper(const batten_fmm *f, fmm_orders orders, bool share
 
 /* ---- making ---- */
 
-static batten_status copy_points(batten_context *ctx, unsigned n, size_t count, const double *from, fmm_points *to) {
+batten_status batten_fmm_copy_points(batten_context *ctx, unsigned n, size_t count, const double *from,
+                                     fmm_points *to) {
   to->block = batten_alloc_array(ctx, count * n, sizeof *to->block);
   if (!to->block) return BATTEN_E_NOMEM;
   to->count = count;
@@ -57,8 +58,8 @@ static batten_status plan_tree(batten_context *ctx, batten_fmm *f, fmm_orders or
                        f->sources.count, f->targets.count);
   size_t full = 1;
   for (unsigned a = 0; a < n; a++) full *= orders.order;
-  batten_status st =
-      batten_fmm_tree_new(ctx, n, &f->sources, &f->targets, f->same, leaf_points(n, orders.order), &f->tree);
+  batten_status st = batten_fmm_tree_new(ctx, n, &f->sources, &f->targets, f->same, 0,
+                                         batten_fmm_leaf_points(n, orders.order), &f->tree);
   if (st < 0) return st;
   if ((st = batten_fmm_lists_new(ctx, n, full, &f->tree, &f->lists)) < 0) return st;
   if (!is_direct_cheaper(f, orders, shared)) return BATTEN_OK;
@@ -67,15 +68,18 @@ static batten_status plan_tree(batten_context *ctx, batten_fmm *f, fmm_orders or
   return BATTEN_OK;
 }
 
-/* Operators, shared or new. */
+batten_status batten_fmm_operators_get(batten_context *ctx, const batten_radial *kernel, fmm_orders orders,
+                                       const batten_fmm *share, fmm_operators **out) {
+  if (!share || !share->operators) return batten_fmm_operators_new(ctx, kernel, orders, out);
+  *out = batten_fmm_operators_retain(share->operators);
+  return BATTEN_OK;
+}
+
+/* What a plan has of operators, and how long they took. */
 static batten_status plan_operators(batten_context *ctx, batten_fmm *f, fmm_orders orders, const batten_fmm *share) {
   const double start = batten_now();
-  if (share && share->operators) {
-    f->operators = batten_fmm_operators_retain(share->operators);
-    return BATTEN_OK;
-  }
-  batten_status st = batten_fmm_operators_new(ctx, &f->kernel, orders, &f->operators);
-  f->info.time_operators_s = batten_now() - start;
+  const batten_status st = batten_fmm_operators_get(ctx, &f->kernel, orders, share, &f->operators);
+  if (!share || share->operators != f->operators) f->info.time_operators_s = batten_now() - start;
   return st;
 }
 
@@ -110,11 +114,11 @@ batten_status batten_fmm_create(batten_context *ctx, const batten_radial *kernel
                     .gradients = options.gradients,
                     .dipoles = options.dipoles,
                     .same = !targets};
-  if ((st = copy_points(ctx, kernel->n, source_count, sources, &f->sources)) < 0) goto done;
+  if ((st = batten_fmm_copy_points(ctx, kernel->n, source_count, sources, &f->sources)) < 0) goto done;
   if (f->same) {
     f->targets = f->sources;
     f->targets.block = NULL;
-  } else if ((st = copy_points(ctx, kernel->n, target_count, targets, &f->targets)) < 0) {
+  } else if ((st = batten_fmm_copy_points(ctx, kernel->n, target_count, targets, &f->targets)) < 0) {
     goto done;
   }
   if ((st = plan_tree(ctx, f, orders, options.share && options.share->operators)) < 0) goto done;
@@ -185,7 +189,7 @@ batten_status batten_fmm_apply(batten_context *ctx, batten_fmm *fmm, const doubl
   if (gradients && !fmm->gradients)
     return batten_fail(ctx, BATTEN_E_INVALID,
                        "gradients: asked of a plan without; set opt.gradients when it is made, or pass NULL");
-  batten_status st = batten_fmm_check_weights(ctx, fmm, weights, dipoles);
+  batten_status st = batten_fmm_check_terms(ctx, fmm, weights, dipoles);
   if (st < 0) return st;
   const double start = batten_now();
   st = (fmm->operators ? apply_fast : apply_directly)(ctx, fmm, weights, dipoles, values, gradients);
@@ -217,7 +221,7 @@ size_t batten_fmm_bytes(const batten_radial *kernel, size_t source_count, size_t
   size_t bytes = plus(sizeof(batten_fmm), times(points, 2 * n * sizeof(double) + 4 + 64 + 5 * sizeof(double)));
   if ((double)source_count * (double)target_count <= DIRECT_TERMS) return bytes;
   const fmm_orders orders = batten_fmm_orders(kernel, o.accuracy, o.gradients || o.dipoles);
-  const size_t leaf = leaf_points(kernel->n, orders.order),
+  const size_t leaf = batten_fmm_leaf_points(kernel->n, orders.order),
                full = n == 2 ? orders.order * orders.order : orders.order * orders.order * orders.order;
   const size_t rank = batten_fmm_rank_guess(kernel, orders.order), stride = rank + FMM_PANEL;
   const size_t of_tree = source_count == target_count ? source_count : points; /* one cloud as a rule, or two */

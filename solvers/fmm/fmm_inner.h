@@ -4,14 +4,17 @@
  *   tree.c       cells: an octree (quadtree) of sources and targets together, points in the order of its leaves
  *   lists.c      which pairs of cells meet, and how: directly, or through the far field
  *   operators.c  the far field of a cell in few numbers, and what carries it to another; the same for all plans
+ *   cells.c      the numbers of one cell: moments, translations, expansions
  *   passes.c     one product: up the tree, across, down again
  *   near.c, products.c   the inner loops, once per instruction set (lanes.h); radial.h the kernels
  *   direct.c     sums without a tree, and the judgement of a product by them
- *   fmm.c        the public calls */
+ *   fmm.c        the public calls
+ *   evaluator.c  one sum at targets that come in batches; its map: evaluator.h */
 #ifndef BATTEN_FMM_INNER_H
 #define BATTEN_FMM_INNER_H
 
 #include <batten/fmm.h>
+#include <math.h>
 #include <stdatomic.h>
 #include <stdbool.h>
 
@@ -91,11 +94,36 @@ typedef struct fmm_tree {
   uint32_t *source_place, *target_place; /* where a point of the caller is; the same array when `same` */
 } fmm_tree;
 
+/* margin: the root holds the box of all points moved out by margin times its longest side. */
 batten_status batten_fmm_tree_new(batten_context *ctx, unsigned n, const fmm_points *sources,
-                                  const fmm_points *targets, bool same, size_t leaf_points, fmm_tree *tree);
+                                  const fmm_points *targets, bool same, double margin, size_t leaf_points,
+                                  fmm_tree *tree);
 void batten_fmm_tree_free(batten_context *ctx, fmm_tree *tree);
 
+/* Whether centres of children are numbers, and the children not too deep. */
+bool batten_fmm_can_part(unsigned n, const fmm_frame *frame, unsigned level);
+
 static inline bool fmm_is_leaf(const fmm_cell *c) { return c->children == 0; }
+
+/* Bit a: on the upper side of the centre along axis a. */
+static inline unsigned fmm_octant(unsigned n, const fmm_frame *frame, const double *x) {
+  unsigned o = 0;
+  for (unsigned a = 0; a < n; a++) o |= (unsigned)(x[a] >= frame->centre[a]) << a;
+  return o;
+}
+
+static inline fmm_frame fmm_child_frame(unsigned n, const fmm_frame *parent, unsigned octant) {
+  fmm_frame f = {.half = parent->half / 2};
+  for (unsigned a = 0; a < n; a++) f.centre[a] = parent->centre[a] + ((octant >> a & 1) ? f.half : -f.half);
+  return f;
+}
+
+/* Centres are apart by no more than the sum of the halves along each axis. */
+static inline bool fmm_side_by_side(unsigned n, const fmm_frame *a, const fmm_frame *b) {
+  for (unsigned k = 0; k < n; k++)
+    if (fabs(a->centre[k] - b->centre[k]) > a->half + b->half) return false;
+  return true;
+}
 
 /* ---- lists.c ---- */
 
@@ -103,6 +131,10 @@ typedef struct fmm_translation {
   uint32_t target, source;
   uint32_t mirror; /* bit a: the offset along axis a is negative */
 } fmm_translation;
+
+/* Counts in begin[i + 1] to where list i begins in begin[i + 1]; who fills the lists leaves there where it ends.
+ * Returns their whole length. */
+size_t batten_fmm_begin_lists(size_t *begin, size_t count);
 
 enum { FMM_LIST_NEAR, FMM_LIST_FROM_CELL, FMM_LIST_TO_CELL, FMM_LISTS, FMM_CHUNK_CELLS = 128 };
 
@@ -127,6 +159,51 @@ batten_status batten_fmm_lists_new(batten_context *ctx, unsigned n, size_t full,
                                    fmm_lists *lists);
 void batten_fmm_lists_free(batten_context *ctx, fmm_lists *lists);
 
+/* ---- cells.c ---- */
+
+enum {
+  FMM_GROUP = 64,         /* tasks that run between two calls of the host's progress callback */
+  FMM_CELLS_TOGETHER = 16 /* that a task of one level takes */
+};
+
+typedef struct fmm_far {
+  const fmm_operators *o;
+  const fmm_lanes *lanes;
+} fmm_far;
+
+/* Doubles that any of the functions below needs as scratch. */
+size_t batten_fmm_scratch(const fmm_operators *o);
+
+/* Weights and dipoles by the places that points have in the order of a tree (NULL: in their own), to
+ * [1 + n][points->count]; equal points that are one there have their sum. */
+void batten_fmm_set_terms(const fmm_points *points, const uint32_t *place, unsigned n, size_t sources,
+                          const double *weights, const double *dipoles, double *to, fmm_terms *terms);
+/* Moments and far fields of all cells: tensors [cells][full], outer [cells][stride]; scratch [FMM_GROUP][...]. */
+batten_status batten_fmm_climb(batten_context *ctx, const fmm_far *f, const fmm_tree *tree, const fmm_terms *terms,
+                               int dipoles, double *tensors, double *outer, double *scratch);
+/* Moments of a child as its parent has them (matrices: up), or expansions the other way (down); in a or b. */
+const double *batten_fmm_shift(const fmm_far *f, const fmm_frame *child, const fmm_frame *parent,
+                               const double (*matrices)[FMM_ORDER_MAX][FMM_ORDER_MAX], const double *tensor,
+                               double *a, double *b);
+/* A tensor through a matrix along each axis; ends in one of the two. */
+double *batten_fmm_through(const fmm_far *f, const double (*matrix)[FMM_ORDER_MAX], double *from, double *to);
+/* Places of the nodes first .. first + count - 1 of a cell, x[axis][count]. */
+void batten_fmm_place_nodes(const fmm_operators *o, const fmm_frame *frame, size_t first, size_t count, double *x[3]);
+/* Which operator carries the far field between two cells of one level that are apart, and which axes it mirrors. */
+unsigned batten_fmm_kind(unsigned n, const fmm_frame *target, const fmm_frame *source, uint32_t *mirror);
+/* inner += C outer for translations of one level, of kind k those from kind_begin[k] on. factor: half a side to the
+ * kernel's power; level: NULL, or what batten_fmm_level_transfer() gave. */
+void batten_fmm_translate(const fmm_far *f, double factor, const double *level, const size_t *kind_begin,
+                          const fmm_translation *translations, const double *outer, double *inner, double *scratch);
+/* Kernels with a logarithm: C_t + ln h D_t for all kinds that there are, [kinds][stride * rank]; NULL without
+ * memory. */
+double *batten_fmm_level_transfer(batten_context *ctx, const fmm_operators *o, double half);
+/* tensor += U inner */
+void batten_fmm_expand(const fmm_far *f, const double *inner, double *tensor, double *spare);
+/* tensor += terms first .. last - 1, that are apart from the cell, by their sums at its nodes */
+void batten_fmm_add_sources(const fmm_far *f, const fmm_frame *frame, fmm_near_function *near, const fmm_terms *terms,
+                            size_t first, size_t last, double *tensor, double *scratch);
+
 /* ---- passes.c ---- */
 
 /* What a product works in. */
@@ -140,8 +217,6 @@ typedef struct fmm_work {
   size_t scratch_each;
   double *level_transfer[FMM_LEVELS_MAX]; /* kernels with a logarithm: [kinds][stride * rank] */
 } fmm_work;
-
-enum { FMM_GROUP = 64 }; /* tasks that run between two calls of the host's progress callback */
 
 struct batten_fmm {
   batten_context *ctx;
@@ -168,14 +243,31 @@ batten_status batten_fmm_passes(batten_context *ctx, batten_fmm *f, const double
 batten_status batten_fmm_direct(batten_context *ctx, const batten_fmm *f, const double *weights,
                                 const double *dipoles, bool gradients, size_t count, const size_t *at, double *sums);
 
+/* ---- fmm.c ---- */
+
+/* Points of a leaf: as many as make direct sums cost about what the translations do. */
+size_t batten_fmm_leaf_points(unsigned n, unsigned order);
+/* One array for each axis; to->block is freed by the caller. */
+batten_status batten_fmm_copy_points(batten_context *ctx, unsigned n, size_t count, const double *from,
+                                     fmm_points *to);
+/* Those of `share`, or new ones. */
+batten_status batten_fmm_operators_get(batten_context *ctx, const batten_radial *kernel, fmm_orders orders,
+                                       const batten_fmm *share, fmm_operators **out);
+
 /* ---- check.c ---- */
 
 /* Everything that can be wrong with the arguments of batten_fmm_create(); opt is not NULL. */
 batten_status batten_fmm_check_plan(batten_context *ctx, const batten_radial *kernel, size_t source_count,
                                     const double *sources, size_t target_count, const double *targets,
                                     const batten_fmm_options *opt);
-/* The same of weights and dipoles. */
-batten_status batten_fmm_check_weights(batten_context *ctx, const batten_fmm *fmm, const double *weights,
+/* The same of points [count][n]. */
+batten_status batten_fmm_check_points(batten_context *ctx, const char *name, unsigned n, size_t count,
+                                      const double *points);
+/* The same of weights [count] and dipoles [count][n]; NULL is fine. */
+batten_status batten_fmm_check_weights(batten_context *ctx, size_t n, size_t count, const double *weights,
                                        const double *dipoles);
+/* The same of what a product of a plan is given. */
+batten_status batten_fmm_check_terms(batten_context *ctx, const batten_fmm *fmm, const double *weights,
+                                     const double *dipoles);
 
 #endif

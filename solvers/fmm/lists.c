@@ -41,22 +41,9 @@ static void push(walk *w, uint32_t target, uint32_t source) {
   if (t->t0 < t->t1 && s->s0 < s->s1) w->stack[w->height++] = (pair){target, source};
 }
 
-/* Centres are apart by no more than the sum of the halves along each axis. */
-static bool side_by_side(unsigned n, const fmm_cell *a, const fmm_cell *b) {
-  for (unsigned k = 0; k < n; k++)
-    if (fabs(a->frame.centre[k] - b->frame.centre[k]) > a->frame.half + b->frame.half) return false;
-  return true;
-}
-
 static void add_translation(walk *w, pair p) {
-  const fmm_frame *t = &w->cell[p.target].frame, *s = &w->cell[p.source].frame;
-  unsigned kind = 0;
   uint32_t mirror = 0;
-  for (unsigned a = 0; a < w->n; a++) {
-    const int steps = (int)lround((t->centre[a] - s->centre[a]) / (2 * t->half));
-    kind |= (unsigned)(steps < 0 ? -steps : steps) << 2 * a;
-    mirror |= (uint32_t)(steps < 0) << a;
-  }
+  const unsigned kind = batten_fmm_kind(w->n, &w->cell[p.target].frame, &w->cell[p.source].frame, &mirror);
   size_t *next = &w->lists->kind_begin[w->chunk_of[p.target] * FMM_KINDS + kind + 1];
   if (w->fills) w->lists->translations[*next] = (fmm_translation){p.target, p.source, mirror};
   ++*next;
@@ -84,7 +71,7 @@ static void meet_far(walk *w, pair p) {
 
 static void meet(walk *w, pair p) {
   const fmm_cell *t = &w->cell[p.target], *s = &w->cell[p.source];
-  if (!side_by_side(w->n, t, s)) {
+  if (!fmm_side_by_side(w->n, &t->frame, &s->frame)) {
     if (t->level == s->level)
       add_translation(w, p);
     else
@@ -109,8 +96,7 @@ static void walk_pairs(walk *w) {
   while (w->height > 0) meet(w, w->stack[--w->height]);
 }
 
-/* Counts in begin[i + 1] to where list i begins in begin[i + 1]; the walk that fills leaves where it ends there. */
-static size_t begin_lists(size_t *begin, size_t count) {
+size_t batten_fmm_begin_lists(size_t *begin, size_t count) {
   size_t total = 0;
   for (size_t i = 0; i < count; i++) {
     const size_t length = begin[i + 1];
@@ -133,10 +119,10 @@ static batten_status alloc_counts(batten_context *ctx, size_t cells, fmm_lists *
 
 static batten_status alloc_lists(batten_context *ctx, size_t cells, fmm_lists *l) {
   for (unsigned k = 0; k < FMM_LISTS; k++) {
-    const size_t total = begin_lists(l->begin[k], cells);
+    const size_t total = batten_fmm_begin_lists(l->begin[k], cells);
     if (!(l->with[k] = batten_alloc_array(ctx, total, sizeof(uint32_t)))) return BATTEN_E_NOMEM;
   }
-  const size_t total = begin_lists(l->kind_begin, l->chunks * FMM_KINDS);
+  const size_t total = batten_fmm_begin_lists(l->kind_begin, l->chunks * FMM_KINDS);
   l->translations = batten_alloc_array(ctx, total, sizeof *l->translations);
   return l->translations ? BATTEN_OK : BATTEN_E_NOMEM;
 }

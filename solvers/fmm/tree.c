@@ -26,7 +26,8 @@ typedef struct builder {
 
 /* ---- cutting ---- */
 
-static void root_frame(unsigned n, const fmm_points *sources, const fmm_points *targets, fmm_frame *frame) {
+static void root_frame(unsigned n, const fmm_points *sources, const fmm_points *targets, double margin,
+                       fmm_frame *frame) {
   double low[3] = {0, 0, 0}, high[3] = {0, 0, 0}, extent = 0;
   for (unsigned a = 0; a < n; a++) {
     low[a] = INFINITY, high[a] = -INFINITY;
@@ -36,6 +37,7 @@ static void root_frame(unsigned n, const fmm_points *sources, const fmm_points *
       low[a] = fmin(low[a], targets->x[a][i]), high[a] = fmax(high[a], targets->x[a][i]);
     extent = fmax(extent, high[a] - low[a]);
   }
+  for (unsigned a = 0; a < n; a++) low[a] -= margin * extent, high[a] += margin * extent;
   double side = extent > 0 ? 0.5 / batten_unit(extent) : 1;
   bool inside = false;
   while (!inside) {
@@ -50,24 +52,18 @@ static void root_frame(unsigned n, const fmm_points *sources, const fmm_points *
   }
 }
 
-static unsigned octant(unsigned n, const fmm_frame *frame, const double *x) {
-  unsigned o = 0;
-  for (unsigned a = 0; a < n; a++) o |= (unsigned)(x[a] >= frame->centre[a]) << a;
-  return o;
-}
-
 /* Sorts records first .. last - 1 by octant, stably; begin[o] .. begin[o + 1] is octant o then. */
 static void part_records(unsigned n, const fmm_frame *frame, record *records, record *spare, size_t first,
                          size_t last, size_t begin[FMM_CLASSES + 1]) {
   size_t next[FMM_CLASSES] = {0}, at = first;
-  for (size_t i = first; i < last; i++) next[octant(n, frame, records[i].x)]++;
+  for (size_t i = first; i < last; i++) next[fmm_octant(n, frame, records[i].x)]++;
   for (unsigned o = 0; o < FMM_CLASSES; o++) {
     begin[o] = at;
     at += next[o];
     next[o] = begin[o];
   }
   begin[FMM_CLASSES] = last;
-  for (size_t i = first; i < last; i++) spare[next[octant(n, frame, records[i].x)]++] = records[i];
+  for (size_t i = first; i < last; i++) spare[next[fmm_octant(n, frame, records[i].x)]++] = records[i];
   if (last > first) memcpy(records + first, spare + first, (last - first) * sizeof *records);
 }
 
@@ -82,12 +78,11 @@ static bool all_equal(unsigned n, const record *a, size_t a_count, const record 
   return true;
 }
 
-/* Whether centres of children are numbers, and the children not too deep. */
-static bool can_part(unsigned n, const fmm_cell *c) {
-  const double quarter = c->frame.half / 2;
-  if (c->level + 1 >= FMM_LEVELS_MAX || quarter < 1e-290) return false;
+bool batten_fmm_can_part(unsigned n, const fmm_frame *frame, unsigned level) {
+  const double quarter = frame->half / 2;
+  if (level + 1 >= FMM_LEVELS_MAX || quarter < 1e-290) return false;
   for (unsigned a = 0; a < n; a++) {
-    const double centre = c->frame.centre[a];
+    const double centre = frame->centre[a];
     if (centre + quarter - centre != quarter || centre - (centre - quarter) != quarter) return false;
   }
   return true;
@@ -100,7 +95,7 @@ static bool is_one_point(const builder *b, const fmm_cell *c) {
 
 static bool is_to_be_cut(const builder *b, const fmm_cell *c) {
   if (c->s1 - c->s0 <= b->leaf_points && c->t1 - c->t0 <= b->leaf_points) return false;
-  return can_part(b->n, c) && !is_one_point(b, c);
+  return batten_fmm_can_part(b->n, &c->frame, c->level) && !is_one_point(b, c);
 }
 
 static batten_status make_room(batten_context *ctx, builder *b) {
@@ -126,15 +121,13 @@ static void add_children(builder *b, size_t index) {
   for (unsigned o = 0; o < FMM_CLASSES; o++) {
     if (s[o] == s[o + 1] && u[o] == u[o + 1]) continue;
     fmm_cell *k = &t->cell[t->cells++];
-    *k = (fmm_cell){.frame.half = c->frame.half / 2,
+    *k = (fmm_cell){.frame = fmm_child_frame(b->n, &c->frame, o),
                     .parent = (uint32_t)index,
                     .level = c->level + 1,
                     .s0 = s[o],
                     .s1 = s[o + 1],
                     .t0 = u[o],
                     .t1 = u[o + 1]};
-    for (unsigned a = 0; a < b->n; a++)
-      k->frame.centre[a] = c->frame.centre[a] + ((o >> a & 1) ? k->frame.half : -k->frame.half);
     c->children++;
   }
 }
@@ -246,7 +239,8 @@ void batten_fmm_tree_free(batten_context *ctx, fmm_tree *t) {
 }
 
 batten_status batten_fmm_tree_new(batten_context *ctx, unsigned n, const fmm_points *sources,
-                                  const fmm_points *targets, bool same, size_t leaf_points, fmm_tree *tree) {
+                                  const fmm_points *targets, bool same, double margin, size_t leaf_points,
+                                  fmm_tree *tree) {
   *tree = (fmm_tree){.same = same};
   builder b = {.n = n, .leaf_points = leaf_points, .tree = tree};
   batten_status st = make_records(ctx, n, sources, &b.sources);
@@ -257,7 +251,7 @@ batten_status batten_fmm_tree_new(batten_context *ctx, unsigned n, const fmm_poi
   if (!(b.spare = batten_alloc_array(ctx, spare, sizeof *b.spare)) || make_room(ctx, &b) < 0) goto done;
   tree->cell[0] = (fmm_cell){.s1 = sources->count, .t1 = targets->count};
   tree->cells = 1;
-  root_frame(n, sources, targets, &tree->cell[0].frame);
+  root_frame(n, sources, targets, margin, &tree->cell[0].frame);
   if ((st = cut_levels(ctx, &b)) < 0) goto done;
   batten_free(ctx, b.spare);
   b.spare = NULL;

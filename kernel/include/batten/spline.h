@@ -23,11 +23,11 @@ typedef struct batten_spline batten_spline;
 /* Data to interpolate. */
 typedef struct batten_spline_data {
   size_t struct_size;
-  unsigned n;             /* dimension, 1 .. 3 */
-  size_t count;           /* N points */
-  const double *points;   /* [N][n], pairwise distinct */
-  const double *values;   /* [N] */
-  size_t gradient_count;  /* M <= N gradients, default 0 */
+  unsigned n;                /* dimension, 1 .. 3 */
+  size_t count;              /* N points */
+  const double *points;      /* [N][n], pairwise distinct */
+  const double *values;      /* [N] */
+  size_t gradient_count;     /* M <= N gradients, default 0 */
   const size_t *gradient_at; /* [M] indices into points, increasing; NULL = the first M */
   const double *gradients;   /* [M][n] */
 } batten_spline_data;
@@ -35,12 +35,12 @@ BATTEN_API batten_spline_data batten_spline_data_default(void);
 
 typedef struct batten_spline_options {
   size_t struct_size;
-  unsigned m;              /* order of the energy, 2m > n, <= 4. Default 2. */
-  double smoothing;        /* rho >= 0, added to the diagonal of phi(|x_i - x_j|) in the unit box: 0 interpolates,
-                              larger is smoother. Default 0. */
+  unsigned m;       /* order of the energy, 2m > n, <= 4. Default 2. */
+  double smoothing; /* rho >= 0, added to the diagonal of phi(|x_i - x_j|) in the unit box: 0 interpolates,
+                       larger is smoother. Default 0. */
   const double *smoothing_per_point; /* [N] >= 0 in place of smoothing; NULL = one for all */
-  size_t loo_samples;      /* leave-one-out errors of so many points, evenly drawn; SIZE_MAX = all, 0 = none.
-                              Default 256. */
+  size_t loo_samples;           /* leave-one-out errors of so many points, evenly drawn; SIZE_MAX = all, 0 = none.
+                                   Default 256. */
   batten_saddle_options saddle; /* method, refinement, tolerance. ITERATIVE is for n = 2 and 3 and makes its products
                                    by <batten/fmm.h>; AUTO chooses it from 12,000 unknowns N + nM on where 2m - n <= 2
                                    (kernels r and r^2 ln r), and where no factor fits the memory limit. */
@@ -49,16 +49,16 @@ BATTEN_API batten_spline_options batten_spline_options_default(void);
 
 typedef struct batten_spline_info {
   batten_saddle_info saddle;
-  double residual_max;  /* max |U(x_i) - v_i| / (max v - min v), recomputed by the evaluator; with smoothing
-                           against v_i - rho w_i. Where all v are equal: over the largest |gradient| times the
-                           unit box's side, else over |v| */
+  double residual_max;    /* max |U(x_i) - v_i| / (max v - min v), recomputed by the evaluator; with smoothing
+                             against v_i - rho w_i. Where all v are equal: over the largest |gradient| times the
+                             unit box's side, else over |v| */
   size_t residual_points; /* at how many points it was looked for: all, or by ITERATIVE, where N (N + nM) is above
                              1e9, 1e9 / (N + nM) evenly drawn ones, and 1000 at least; gradients likewise */
   double gradient_residual_max; /* the same for gradients, relative to the largest |gradient|; 0 without */
-  double loo_rms;       /* root mean square of U_without_i(x_i) - v_i over the sample, unit of the values; NaN when
-                           not computed (loo_samples = 0, or N + nM = k, or ITERATIVE, which has no factor) */
-  size_t loo_samples;   /* how many; points without which the polynomial part is undetermined are left out */
-  double energy;        /* w' K w: the minimised energy up to its constant; unit box, values squared */
+  double loo_rms;     /* root mean square of U_without_i(x_i) - v_i over the sample, unit of the values; NaN when
+                         not computed (loo_samples = 0, or N + nM = k, or ITERATIVE, which has no factor) */
+  size_t loo_samples; /* how many; points without which the polynomial part is undetermined are left out */
+  double energy;      /* w' K w: the minimised energy up to its constant; unit box, values squared */
   double time_total_s;
 } batten_spline_info;
 
@@ -140,16 +140,16 @@ BATTEN_API batten_status batten_spline_fit_reduced(batten_context *ctx, const ba
 typedef struct batten_spline_parts {
   size_t struct_size;
   unsigned n, m;
-  size_t count;              /* N centres */
-  const double *centers;     /* [N][n], caller's unit */
-  const double *coefficients; /* [N] w_i for the unit box */
-  size_t gradient_count;     /* M */
-  const size_t *gradient_at; /* [M] increasing */
+  size_t count;                        /* N centres */
+  const double *centers;               /* [N][n], caller's unit */
+  const double *coefficients;          /* [N] w_i for the unit box */
+  size_t gradient_count;               /* M */
+  const size_t *gradient_at;           /* [M] increasing */
   const double *gradient_coefficients; /* [M][n] */
-  size_t polynomial_count;   /* k = C(n+m-1, n) */
-  const double *polynomial;  /* [k] for the unit box; monomials by degree: 1, x, y, z, x^2, xy, xz, y^2, yz, z^2,
-                                x^3, x^2 y, ... */
-  double origin[3];          /* unit box coordinate = (x - origin) / scale */
+  size_t polynomial_count;             /* k = C(n+m-1, n) */
+  const double *polynomial; /* [k] for the unit box; monomials by degree: 1, x, y, z, x^2, xy, xz, y^2, yz, z^2,
+                               x^3, x^2 y, ... */
+  double origin[3];         /* unit box coordinate = (x - origin) / scale */
   double scale;
 } batten_spline_parts;
 BATTEN_API void batten_spline_get_parts(const batten_spline *s, batten_spline_parts *parts);
@@ -160,35 +160,40 @@ BATTEN_API batten_status batten_spline_create(batten_context *ctx, const batten_
 /* points [count][n]; values [count], gradients [count][n], hessians [count][n][n]; each may be NULL.
  * Threaded and vectorised; the same bits for any thread count, any batch and any instruction set. Derivatives that do
  * not exist at a centre (r^1: gradient; r^3 with gradient data: Hessian) are evaluated as if its term were 0. Points
- * that are not finite give NaN. Progress (phase "evaluate") only in batches that take long; cancelled, the outputs are
- * partly written. Fails: INVALID (outputs untouched), CANCELLED. */
+ * that are not finite give NaN. Progress (phase "evaluate") only in batches that take long; cancelled, the outputs
+ * are partly written. Fails: INVALID (outputs untouched), CANCELLED. */
 BATTEN_API batten_status batten_spline_evaluate(batten_context *ctx, const batten_spline *s, size_t count,
                                                 const double *points, double *values, double *gradients,
                                                 double *hessians);
 
-/* Values and gradients at many points by <batten/fmm.h>, in time O(N + count) for a batch: worth it from some thousand
- * centres and points on. The sum over the centres is approximated; its rounding is not that of batten_spline_evaluate(),
- * and depends on the batch. */
+/* Values and gradients at many points by <batten/fmm.h>: about a microsecond for a value where other points were
+ * asked for before, however many centres there are; more where a batch comes first. Worth it from some thousand
+ * centres and points on. The sum over the centres is approximated; its rounding is not that of
+ * batten_spline_evaluate(). */
 typedef struct batten_spline_evaluator batten_spline_evaluator;
 
 /* accuracy: 1e-12 .. 1e-3, of a batch's sums over the centres (2-norm, without the polynomial, which they may largely
- * cancel). n = 2 or 3. The spline is retained. Fails: INVALID, NOMEM. */
+ * cancel). n = 2 or 3. The spline is retained. Takes a second or more for operators (rising with the accuracy), and
+ * O(N) for the centres. What it keeps of batches is bounded by batten_fmm_options.cache_bytes as it is by default.
+ * Fails: INVALID, TOO_LARGE, NOMEM, CANCELLED. */
 BATTEN_API batten_status batten_spline_evaluator_new(batten_context *ctx, batten_spline *s, double accuracy,
                                                      batten_spline_evaluator **out);
 
-/* points [count][n] (finite); values [count], gradients [count][n]; each may be NULL, gradients take about four times
- * as long. *value_error (may be NULL; unit of the values): the largest difference to batten_spline_evaluate() at up to
- * 100 of the points, evenly drawn. The first batch makes operators for a second or so. One batch at a time; ctx is the
- * one that e was made with. Same bits for any number of threads. Outputs are untouched on failure. Fails: INVALID,
- * TOO_LARGE, NOMEM, CANCELLED. */
-BATTEN_API batten_status batten_spline_evaluator_evaluate(batten_context *ctx, batten_spline_evaluator *e, size_t count,
-                                                          const double *points, double *values, double *gradients,
-                                                          double *value_error);
+/* points [count][n] (finite); values [count], gradients [count][n]; each may be NULL, gradients take some times as
+ * long. Points may lie anywhere. *value_error (may be NULL; unit of the values): the largest difference to
+ * batten_spline_evaluate() at up to 100 of the points, evenly drawn, which are O(100 N). Values and gradients of a
+ * point have the same bits in any batch, by any number of threads and on any instruction set. One batch at a time;
+ * ctx is the one that e was made with. Outputs are untouched on failure, and e is as good as before. Fails: INVALID,
+ * NOMEM, CANCELLED. */
+BATTEN_API batten_status batten_spline_evaluator_evaluate(batten_context *ctx, batten_spline_evaluator *e,
+                                                          size_t count, const double *points, double *values,
+                                                          double *gradients, double *value_error);
 /* NULL is fine. */
 BATTEN_API void batten_spline_evaluator_free(batten_spline_evaluator *e);
 
-/* Bounds of U over boxes, as batten_field says: boxes [count][2][n], ranges [count][2]. Far centres are taken together
- * (their sum is expanded about the middle of the box), near ones by themselves: ranges narrow with the boxes. */
+/* Bounds of U over boxes, as batten_field says: boxes [count][2][n], ranges [count][2]. Far centres are taken
+ * together (their sum is expanded about the middle of the box), near ones by themselves: ranges narrow with the
+ * boxes. */
 BATTEN_API batten_status batten_spline_bounds(batten_context *ctx, const batten_spline *s, size_t count,
                                               const double *boxes, double *ranges);
 
