@@ -320,6 +320,12 @@ static void test_evaluator(batten_context *ctx, unsigned n, unsigned m, bool her
     T_CHECK(error <= worst, "the error that is told, %.2g, is one of them, %.2g", error, worst);
   }
   T_OK(batten_spline_evaluator_evaluate(ctx, e, count, places.points, v, NULL, NULL), ctx);
+  T_CHECK(!memcmp(u, v, count * sizeof *u), "values have the same bits without gradients");
+  v[0] = NAN;
+  T_OK(batten_spline_evaluator_evaluate(ctx, e, MORE, places.points + (count - MORE) * n, v, dv, NULL), ctx);
+  T_CHECK(
+      !memcmp(u + count - MORE, v, MORE * sizeof *u) && !memcmp(du + (count - MORE) * n, dv, MORE * n * sizeof *u),
+      "and in another batch");
   T_OK(batten_spline_evaluator_evaluate(ctx, e, 0, NULL, NULL, NULL, &error), ctx);
   T_CHECK(error == 0, "no places, no error");
   const double before = u[0];
