@@ -21,6 +21,11 @@ static const double MARGIN = 1.5;
 /* Sources up to which sums are direct: there they cost less than the nodes of nearby targets. */
 static const size_t DIRECT_SOURCES = 3000;
 
+/* Sources that are summed directly at each target rather than through more places. Measured for three targets to a
+ * source near a surface: half of it makes places dear, twice of it makes targets dear. The work for a place grows
+ * like order^(2 n - 2), that for a target like order^n. */
+static size_t near_most(unsigned n, unsigned order) { return n == 2 ? 48 * order : 12 * (size_t)order * order; }
+
 /* ---- making ---- */
 
 /* Far fields of all cells; of the top levels also the weights at their nodes. */
@@ -70,8 +75,8 @@ static batten_status make_fast(batten_context *ctx, batten_fmm_evaluator *e, con
   batten_status st = batten_fmm_operators_get(ctx, &e->kernel, orders, share, &e->operators);
   if (st < 0) return st;
   if (!share || share->operators != e->operators) e->info.time_operators_s = batten_now() - start;
-  const size_t leaf = batten_fmm_leaf_points(e->kernel.n, orders.order) / 2;
-  e->near_most = 12 * leaf;
+  const size_t leaf = near_most(e->kernel.n, orders.order) / 16;
+  e->near_most = near_most(e->kernel.n, orders.order);
   return batten_fmm_tree_new(ctx, e->kernel.n, sources, sources, true, MARGIN, leaf, &e->tree);
 }
 

@@ -15,7 +15,8 @@ batten_fmm_options batten_fmm_options_default(void) {
 /* Terms below which a tree is not even tried: some hundredths of a second at most, and less than its set-up. */
 static const double DIRECT_TERMS = 4e6;
 
-size_t batten_fmm_leaf_points(unsigned n, unsigned order) {
+/* Points of a leaf: as many as make direct sums cost about what the translations do. */
+static size_t leaf_points(unsigned n, unsigned order) {
   if (n == 2) return 6 * (size_t)order;
   return order <= 6 ? 128 : order <= 8 ? 224 : 384;
 }
@@ -58,8 +59,8 @@ static batten_status plan_tree(batten_context *ctx, batten_fmm *f, fmm_orders or
                        f->sources.count, f->targets.count);
   size_t full = 1;
   for (unsigned a = 0; a < n; a++) full *= orders.order;
-  batten_status st = batten_fmm_tree_new(ctx, n, &f->sources, &f->targets, f->same, 0,
-                                         batten_fmm_leaf_points(n, orders.order), &f->tree);
+  batten_status st =
+      batten_fmm_tree_new(ctx, n, &f->sources, &f->targets, f->same, 0, leaf_points(n, orders.order), &f->tree);
   if (st < 0) return st;
   if ((st = batten_fmm_lists_new(ctx, n, full, &f->tree, &f->lists)) < 0) return st;
   if (!is_direct_cheaper(f, orders, shared)) return BATTEN_OK;
@@ -221,7 +222,7 @@ size_t batten_fmm_bytes(const batten_radial *kernel, size_t source_count, size_t
   size_t bytes = plus(sizeof(batten_fmm), times(points, 2 * n * sizeof(double) + 4 + 64 + 5 * sizeof(double)));
   if ((double)source_count * (double)target_count <= DIRECT_TERMS) return bytes;
   const fmm_orders orders = batten_fmm_orders(kernel, o.accuracy, o.gradients || o.dipoles);
-  const size_t leaf = batten_fmm_leaf_points(kernel->n, orders.order),
+  const size_t leaf = leaf_points(kernel->n, orders.order),
                full = n == 2 ? orders.order * orders.order : orders.order * orders.order * orders.order;
   const size_t rank = batten_fmm_rank_guess(kernel, orders.order), stride = rank + FMM_PANEL;
   const size_t of_tree = source_count == target_count ? source_count : points; /* one cloud as a rule, or two */

@@ -245,8 +245,6 @@ batten_status batten_fmm_direct(batten_context *ctx, const batten_fmm *f, const 
 
 /* ---- fmm.c ---- */
 
-/* Points of a leaf: as many as make direct sums cost about what the translations do. */
-size_t batten_fmm_leaf_points(unsigned n, unsigned order);
 /* One array for each axis; to->block is freed by the caller. */
 batten_status batten_fmm_copy_points(batten_context *ctx, unsigned n, size_t count, const double *from,
                                      fmm_points *to);
