@@ -3,6 +3,7 @@
  * rows of coordinates. Writes the values at the N points and at the Q places to FILE.out, and prints the seconds of
  * the fit and of the values, the peak of resident memory in bytes, and what the fit says of itself. */
 #include <batten/batten.h>
+#include <math.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -24,12 +25,12 @@ static double *read_all(const char *path, size_t *count) {
   return out;
 }
 
-/* By fast sums behind an iteration, else by direct ones. */
-static batten_status values_at(batten_context *ctx, batten_spline *s, bool fast, size_t count, const double *places,
-                               double *out) {
-  if (!fast) return batten_spline_evaluate(ctx, s, count, places, out, NULL, NULL);
+/* By sums of that accuracy, 0: by direct ones. */
+static batten_status values_at(batten_context *ctx, batten_spline *s, double accuracy, size_t count,
+                               const double *places, double *out) {
+  if (accuracy == 0) return batten_spline_evaluate(ctx, s, count, places, out, NULL, NULL);
   batten_spline_evaluator *e = NULL;
-  batten_status status = batten_spline_evaluator_new(ctx, s, 1e-9, &e);
+  batten_status status = batten_spline_evaluator_new(ctx, s, accuracy, &e);
   if (status >= 0) status = batten_spline_evaluator_evaluate(ctx, e, count, places, out, NULL, NULL);
   batten_spline_evaluator_free(e);
   return status;
@@ -68,8 +69,10 @@ int main(int argc, char **argv) {
   double start = batten_now();
   batten_status status = batten_spline_fit(ctx, &d, &o, &s, &info);
   double fitted = batten_now();
-  const bool fast = status >= 0 && info.saddle.method == BATTEN_SADDLE_ITERATIVE;
-  if (status >= 0) status = values_at(ctx, s, fast, queries, places, out);
+  double sums = 0; /* of an iteration: so accurate that what it leaves shows */
+  if (status >= 0 && info.saddle.method == BATTEN_SADDLE_ITERATIVE)
+    sums = fmin(fmax(0.01 * o.saddle.accuracy, 1e-12), 1e-3);
+  if (status >= 0) status = values_at(ctx, s, sums, queries, places, out);
   double end = batten_now();
   if (status < 0) fprintf(stderr, "%s\n", batten_error(ctx));
   char path[4096];
