@@ -1,31 +1,32 @@
 /* Pairs of triangles that have more in common than the corners they share.
  *
- * Candidates come from a tree of boxes (split at the median of the centres, nodes in preorder, so that a search is
- * one pass with skips). A pair is decided by exact orientation signs alone. Corners count as shared when they lie at
- * the same place, whatever their indices. What two triangles share beyond that is found at the edges that lie
- * opposite the shared corners: the common part of two triangles is convex, so if it is more than the shared
- * corner, it reaches the far edge of one of them. */
+ * Candidates come from a perfect binary tree of boxes, split at the medians of the centres. Node h has the children
+ * 2 h and 2 h + 1, and what follows the subtree of h in a walk over all is (h + 1) without its trailing zeros, so no
+ * links are stored. Each leaf looks for others behind itself only: every pair comes once. A pair is decided by exact
+ * orientation signs alone. Corners count as shared when they lie at the same place, whatever their indices. What two
+ * triangles share beyond that is found at the edges that lie opposite the shared corners: the common part of two
+ * triangles is convex, so if it is more than the shared corner, it reaches the far edge of one of them. */
 #include "mesh_inner.h"
 
 #include "base/checked.h"
 #include "predicates.h"
 #include "vec.h"
 
+#include <stdatomic.h>
 #include <stdbool.h>
 #include <string.h>
 
-enum { LEAF = 4, DEPTH_MAX = 64, TASK_TRIANGLES = 2048 };
+enum {
+  LEAF = 8, /* triangles at most; half of it at least, but in the smallest trees */
+  TASK_LEAVES = 256,
+  TASK_ITEMS = 8192, /* vertices or triangles */
+  TASKS = 256,       /* between two calls of progress: some 0.3 s */
+  LEVELS_ALONE = 6   /* halved one level after the other, the 2^6 parts below side by side */
+};
 
 typedef struct box {
   double lower[3], upper[3];
 } box;
-
-typedef struct node {
-  box box;
-  uint32_t first, count; /* triangles order[first .. first + count) below it */
-  uint32_t skip;         /* the node after its subtree */
-  bool leaf;
-} node;
 
 typedef const double *corners[3];
 
@@ -147,32 +148,52 @@ static bool cross(const double *const *s, const double *const *t) {
 
 /* ---- the tree ----------------------------------------------------------------------------------- */
 
-typedef struct box_tree {
-  uint32_t *order; /* [count] triangles */
-  size_t count;
-  node *nodes;
-  uint32_t node_count;
-  const double *vertices;
+typedef struct item {
+  double centre[3]; /* 3 times */
+  uint32_t triangle;
+} item;
+
+typedef struct search {
+  const double *vertices; /* [V][3] scaled */
   const uint32_t *triangles;
-} box_tree;
+  size_t vertex_count, triangle_count;
+  size_t count;      /* of the triangles that have an area */
+  item *items;       /* [count] while the tree is made */
+  uint32_t *order;   /* [count] triangles in the order of the leaves */
+  unsigned depth;    /* leaf j: node 2^depth + j, the triangles order[first_of(depth, j) .. first_of(depth, j + 1)) */
+  box *boxes;        /* [2^(depth + 1)] by node, from 1 */
+  size_t *pairs;     /* [tasks] */
+  atomic_uchar *hit; /* [F] by triangle: NO_AREA, or whether it takes part */
+  double scale[2];   /* whose product is the power of two */
+  const double *source;
+  double *copy;
+  size_t first_task;
+  unsigned level;
+} search;
 
-static void triangle_corners(const box_tree *tree, uint32_t t, corners out) {
-  for (size_t k = 0; k < 3; k++) out[k] = tree->vertices + 3 * (size_t)tree->triangles[3 * (size_t)t + k];
+enum { NO_AREA = 2 };
+
+static void triangle_corners(const search *s, uint32_t t, corners out) {
+  for (size_t k = 0; k < 3; k++) out[k] = s->vertices + 3 * (size_t)s->triangles[3 * (size_t)t + k];
 }
 
-static void box_add(box *b, const double *p) {
-  for (int k = 0; k < 3; k++) {
-    b->lower[k] = fmin(b->lower[k], p[k]);
-    b->upper[k] = fmax(b->upper[k], p[k]);
-  }
-}
-
-static box triangle_box(const box_tree *tree, uint32_t t) {
-  box b = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+static box triangle_box(const search *s, uint32_t t) {
+  box b;
   corners c;
-  triangle_corners(tree, t, c);
-  for (int k = 0; k < 3; k++) box_add(&b, c[k]);
+  triangle_corners(s, t, c);
+  for (int k = 0; k < 3; k++) {
+    double x = c[0][k], y = c[1][k], z = c[2][k], low = x < y ? x : y, high = x < y ? y : x;
+    b.lower[k] = low < z ? low : z;
+    b.upper[k] = high > z ? high : z;
+  }
   return b;
+}
+
+static void box_join(box *b, const box *other) {
+  for (int k = 0; k < 3; k++) {
+    if (other->lower[k] < b->lower[k]) b->lower[k] = other->lower[k];
+    if (other->upper[k] > b->upper[k]) b->upper[k] = other->upper[k];
+  }
 }
 
 static bool boxes_meet(const box *a, const box *b) {
@@ -181,29 +202,23 @@ static bool boxes_meet(const box *a, const box *b) {
   return true;
 }
 
-static double centre(const box_tree *tree, uint32_t t, int axis) {
-  corners c;
-  triangle_corners(tree, t, c);
-  return c[0][axis] / 3 + c[1][axis] / 3 + c[2][axis] / 3;
+static bool before(const item *a, const item *b, int axis) {
+  return a->centre[axis] < b->centre[axis] || (a->centre[axis] == b->centre[axis] && a->triangle < b->triangle);
 }
 
-static bool before(const box_tree *tree, uint32_t s, uint32_t t, int axis) {
-  double a = centre(tree, s, axis), b = centre(tree, t, axis);
-  return a < b || (a == b && s < t);
-}
-
-/* Brings the lower half of order[0 .. count) along the axis to the front: quickselect, middle as pivot. */
-static void split_at_median(const box_tree *tree, uint32_t *order, uint32_t count, int axis) {
-  uint32_t low = 0, high = count - 1, wanted = count / 2;
+/* Brings the `wanted` first ones along the axis to the front: quickselect, middle as pivot. */
+static void split_at(item *items, size_t count, size_t wanted, int axis) {
+  size_t low = 0, high = count - 1;
   while (low < high) {
-    uint32_t pivot = order[low + (high - low) / 2], i = low, j = high;
+    item pivot = items[low + (high - low) / 2];
+    size_t i = low, j = high;
     for (;;) {
-      while (before(tree, order[i], pivot, axis)) i++;
-      while (before(tree, pivot, order[j], axis)) j--;
+      while (before(items + i, &pivot, axis)) i++;
+      while (before(&pivot, items + j, axis)) j--;
       if (i >= j) break;
-      uint32_t t = order[i];
-      order[i++] = order[j];
-      order[j--] = t;
+      item t = items[i];
+      items[i++] = items[j];
+      items[j--] = t;
     }
     if (j >= wanted)
       high = j;
@@ -212,129 +227,216 @@ static void split_at_median(const box_tree *tree, uint32_t *order, uint32_t coun
   }
 }
 
-static box box_of(const box_tree *tree, uint32_t first, uint32_t count) {
-  box all = triangle_box(tree, tree->order[first]);
-  for (uint32_t i = 1; i < count; i++) {
-    box b = triangle_box(tree, tree->order[first + i]);
-    box_add(&all, b.lower);
-    box_add(&all, b.upper);
-  }
-  return all;
+static int longest_axis(const item *items, size_t count) {
+  double lower[3], upper[3];
+  memcpy(lower, items->centre, sizeof lower);
+  memcpy(upper, items->centre, sizeof upper);
+  for (size_t i = 1; i < count; i++)
+    for (int k = 0; k < 3; k++) {
+      double x = items[i].centre[k];
+      if (x < lower[k]) lower[k] = x;
+      if (x > upper[k]) upper[k] = x;
+    }
+  int axis = 0;
+  for (int k = 1; k < 3; k++)
+    if (upper[k] - lower[k] > upper[axis] - lower[axis]) axis = k;
+  return axis;
 }
 
-static void build(box_tree *tree) {
-  struct {
-    uint32_t first, count;
-  } stack[DEPTH_MAX];
-  int depth = 0;
-  stack[depth].first = 0;
-  stack[depth].count = (uint32_t)tree->count;
-  depth++;
-  while (depth > 0) {
-    uint32_t first = stack[--depth].first, count = stack[depth].count, id = tree->node_count++;
-    node *n = tree->nodes + id;
-    *n = (node){.box = box_of(tree, first, count), .first = first, .count = count, .leaf = count <= LEAF};
-    if (n->leaf) continue;
-    int axis = 0;
-    for (int k = 1; k < 3; k++)
-      if (n->box.upper[k] - n->box.lower[k] > n->box.upper[axis] - n->box.lower[axis]) axis = k;
-    split_at_median(tree, tree->order + first, count, axis);
-    uint32_t half = count / 2;
-    stack[depth].first = first + half;
-    stack[depth++].count = count - half;
-    stack[depth].first = first;
-    stack[depth++].count = half;
+/* Where part j of the 2^level parts begins. */
+static size_t first_of(const search *s, unsigned level, size_t j) {
+  return (size_t)((uint64_t)j * s->count >> level); /* both below 2^32 */
+}
+
+static void halve(const search *s, unsigned level, size_t j) {
+  size_t first = first_of(s, level, j), count = first_of(s, level, j + 1) - first;
+  size_t half = first_of(s, level + 1, 2 * j + 1) - first;
+  split_at(s->items + first, count, half, longest_axis(s->items + first, count));
+}
+
+static void halve_task(void *arg, size_t j) {
+  const search *s = arg;
+  halve(s, s->level, j);
+}
+
+/* All below part j of the present level, and the boxes of its leaves. */
+static void finish_task(void *arg, size_t j) {
+  const search *s = arg;
+  for (unsigned level = s->level; level < s->depth; level++)
+    for (size_t i = j << (level - s->level); i < (j + 1) << (level - s->level); i++) halve(s, level, i);
+  for (size_t leaf = j << (s->depth - s->level); leaf < (j + 1) << (s->depth - s->level); leaf++) {
+    size_t first = first_of(s, s->depth, leaf), end = first_of(s, s->depth, leaf + 1);
+    box all = triangle_box(s, s->items[first].triangle);
+    for (size_t i = first; i < end; i++) {
+      box one = triangle_box(s, s->items[i].triangle);
+      box_join(&all, &one);
+      s->order[i] = s->items[i].triangle;
+    }
+    s->boxes[((size_t)1 << s->depth) + leaf] = all;
   }
-  /* Preorder: a subtree ends where the next node begins after its last triangle. */
-  for (uint32_t i = tree->node_count; i-- > 0;) {
-    node *n = tree->nodes + i;
-    n->skip = i + 1;
-    if (!n->leaf) n->skip = tree->nodes[tree->nodes[i + 1].skip].skip;
+}
+
+static batten_status build(batten_context *ctx, search *s) {
+  batten_status st = BATTEN_OK;
+  unsigned alone = s->depth < LEVELS_ALONE ? s->depth : LEVELS_ALONE;
+  for (s->level = 0; st >= 0 && s->level < alone; s->level++) {
+    batten_parallel(ctx, (size_t)1 << s->level, halve_task, s);
+    st = batten_progress(ctx, "crossings", 0.05 * (1 + s->level));
   }
+  if (st < 0) return st;
+  batten_parallel(ctx, (size_t)1 << s->level, finish_task, s);
+  for (size_t h = (size_t)1 << s->depth; h-- > 1;) {
+    s->boxes[h] = s->boxes[2 * h];
+    box_join(s->boxes + h, s->boxes + 2 * h + 1);
+  }
+  return batten_progress(ctx, "crossings", 0.4);
 }
 
 /* ---- all pairs ---------------------------------------------------------------------------------- */
 
-typedef struct search {
-  box_tree tree;
-  size_t *pairs;      /* [tasks] */
-  unsigned char *hit; /* [F] by triangle; only its own task writes it */
-} search;
+static void meet(const search *s, uint32_t t, const double *const *a, uint32_t u, size_t *pairs) {
+  corners b;
+  triangle_corners(s, u, b);
+  if (!cross(a, b)) return;
+  atomic_store_explicit(s->hit + t, 1, memory_order_relaxed); /* several tasks may, but the same */
+  atomic_store_explicit(s->hit + u, 1, memory_order_relaxed);
+  ++*pairs;
+}
 
-static void search_one(search *s, uint32_t t, size_t *pairs) {
-  const box_tree *tree = &s->tree;
-  corners a, b;
-  triangle_corners(tree, t, a);
-  box own = triangle_box(tree, t);
-  for (uint32_t i = 0; i < tree->node_count;) {
-    const node *n = tree->nodes + i;
-    bool near = boxes_meet(&own, &n->box);
-    for (uint32_t j = 0; near && n->leaf && j < n->count; j++) {
-      uint32_t u = tree->order[n->first + j];
-      box other = triangle_box(tree, u);
-      if (u == t || !boxes_meet(&own, &other)) continue;
-      triangle_corners(tree, u, b);
-      if (!cross(a, b)) continue;
-      s->hit[t] = 1;
-      *pairs += u < t;
+static void search_leaf(const search *s, size_t leaf, size_t *pairs) {
+  size_t first = first_of(s, s->depth, leaf), count = first_of(s, s->depth, leaf + 1) - first;
+  const size_t leaves = (size_t)1 << s->depth;
+  const box *own = s->boxes + leaves + leaf;
+  const uint32_t *t = s->order + first;
+  box boxes[LEAF];
+  corners a[LEAF];
+  for (size_t i = 0; i < count; i++) {
+    boxes[i] = triangle_box(s, t[i]);
+    triangle_corners(s, t[i], a[i]);
+    for (size_t j = 0; j < i; j++)
+      if (boxes_meet(boxes + i, boxes + j)) meet(s, t[j], a[j], t[i], pairs);
+  }
+  for (size_t h = leaves + leaf;;) {
+    for (h++; !(h & 1);) h >>= 1;
+    if (h == 1) return;
+    while (h < leaves && boxes_meet(own, s->boxes + h)) h *= 2;
+    if (!boxes_meet(own, s->boxes + h)) continue;
+    size_t from = first_of(s, s->depth, h - leaves), to = first_of(s, s->depth, h - leaves + 1);
+    for (size_t j = from; j < to; j++) {
+      box other = triangle_box(s, s->order[j]);
+      if (!boxes_meet(own, &other)) continue;
+      for (size_t i = 0; i < count; i++)
+        if (boxes_meet(boxes + i, &other)) meet(s, t[i], a[i], s->order[j], pairs);
     }
-    i = near ? i + 1 : n->skip;
   }
 }
 
 static void search_task(void *arg, size_t task) {
   search *s = arg;
-  size_t pairs = 0, end = (task + 1) * TASK_TRIANGLES < s->tree.count ? (task + 1) * TASK_TRIANGLES : s->tree.count;
-  for (size_t i = task * TASK_TRIANGLES; i < end; i++) search_one(s, s->tree.order[i], &pairs);
-  s->pairs[task] = pairs;
+  size_t pairs = 0, leaves = (size_t)1 << s->depth, first = (s->first_task + task) * TASK_LEAVES;
+  for (size_t i = first; i < leaves && i < first + TASK_LEAVES; i++) search_leaf(s, i, &pairs);
+  s->pairs[s->first_task + task] = pairs;
+}
+
+static batten_status search_all(batten_context *ctx, search *s, size_t tasks, size_t *total) {
+  *total = 0;
+  for (s->first_task = 0; s->first_task < tasks; s->first_task += TASKS) {
+    size_t now = tasks - s->first_task < TASKS ? tasks - s->first_task : TASKS;
+    batten_parallel(ctx, now, search_task, s);
+    for (size_t i = 0; i < now; i++) *total += s->pairs[s->first_task + i];
+    batten_status st = batten_progress(ctx, "crossings", 0.4 + 0.6 * (double)(s->first_task + now) / (double)tasks);
+    if (st < 0) return st;
+  }
+  return BATTEN_OK;
+}
+
+static void scale_task(void *arg, size_t task) {
+  const search *s = arg;
+  size_t end = 3 * (task + 1) * TASK_ITEMS;
+  if (end > 3 * s->vertex_count) end = 3 * s->vertex_count;
+  for (size_t i = 3 * task * TASK_ITEMS; i < end; i++) s->copy[i] = s->source[i] * s->scale[0] * s->scale[1];
 }
 
 /* A copy of the vertices in a power-of-two unit near their size: exact, and the determinants stay in range. */
-static double *scaled_copy(batten_context *ctx, size_t vertex_count, const double *vertices) {
-  double *copy = batten_alloc_array(ctx, vertex_count, 3 * sizeof *copy), size = 0;
-  if (!copy) return NULL;
+static batten_status take_scaled(batten_context *ctx, search *s) {
+  s->copy = batten_alloc_array(ctx, s->vertex_count, 3 * sizeof *s->copy);
+  if (!s->copy) return BATTEN_E_NOMEM;
   int exponent = 0;
-  for (size_t i = 0; i < 3 * vertex_count; i++) size = fmax(size, fabs(vertices[i]));
+  double size = batten_mesh_size(s->vertex_count, s->source);
   frexp(size, &exponent);
-  for (size_t i = 0; i < 3 * vertex_count; i++) copy[i] = ldexp(vertices[i], -exponent);
-  return copy;
+  s->scale[0] = ldexp(1, -exponent / 2); /* the whole might overflow */
+  s->scale[1] = ldexp(1, -exponent - -exponent / 2);
+  batten_parallel(ctx, (s->vertex_count + TASK_ITEMS - 1) / TASK_ITEMS, scale_task, s);
+  s->vertices = s->copy;
+  return BATTEN_OK;
+}
+
+static void area_task(void *arg, size_t task) {
+  const search *s = arg;
+  size_t end = (task + 1) * TASK_ITEMS < s->triangle_count ? (task + 1) * TASK_ITEMS : s->triangle_count;
+  for (size_t t = task * TASK_ITEMS; t < end; t++) {
+    corners c;
+    int x, y;
+    triangle_corners(s, (uint32_t)t, c);
+    atomic_init(s->hit + t, projection(c[0], c[1], c[2], &x, &y) ? 0 : NO_AREA);
+  }
+}
+
+static void centre_task(void *arg, size_t task) {
+  const search *s = arg;
+  size_t end = (task + 1) * TASK_ITEMS < s->count ? (task + 1) * TASK_ITEMS : s->count;
+  for (size_t i = task * TASK_ITEMS; i < end; i++) {
+    corners c;
+    triangle_corners(s, s->items[i].triangle, c);
+    for (int k = 0; k < 3; k++) s->items[i].centre[k] = c[0][k] + c[1][k] + c[2][k];
+  }
+}
+
+/* The triangles that have an area, in a tree. */
+static batten_status take_triangles(batten_context *ctx, search *s) {
+  s->hit = batten_alloc_array(ctx, s->triangle_count, sizeof *s->hit);
+  if (!s->hit) return BATTEN_E_NOMEM;
+  batten_parallel(ctx, (s->triangle_count + TASK_ITEMS - 1) / TASK_ITEMS, area_task, s);
+  for (size_t t = 0; t < s->triangle_count; t++) s->count += atomic_load(s->hit + t) != NO_AREA;
+  while (s->count > (size_t)LEAF << s->depth) s->depth++;
+  s->items = batten_alloc_array(ctx, s->count, sizeof *s->items);
+  s->order = s->items ? batten_alloc_array(ctx, s->count, sizeof *s->order) : NULL;
+  s->boxes = s->order ? batten_alloc_array(ctx, (size_t)2 << s->depth, sizeof *s->boxes) : NULL;
+  if (!s->boxes) return BATTEN_E_NOMEM;
+  for (size_t t = 0, i = 0; t < s->triangle_count; t++)
+    if (atomic_load(s->hit + t) != NO_AREA) s->items[i++].triangle = (uint32_t)t;
+  batten_parallel(ctx, (s->count + TASK_ITEMS - 1) / TASK_ITEMS, centre_task, s);
+  batten_status st = s->count ? build(ctx, s) : BATTEN_OK;
+  batten_free(ctx, s->items);
+  s->items = NULL;
+  return st;
 }
 
 batten_status batten_mesh_find_crossings(batten_context *ctx, size_t vertex_count, const double *vertices,
                                          size_t triangle_count, const uint32_t *triangles, unsigned char *marks,
                                          size_t *pairs) {
-  batten_status st = BATTEN_E_NOMEM;
-  double *copy = scaled_copy(ctx, vertex_count, vertices);
-  search s = {.tree = {.vertices = copy, .triangles = triangles}};
-  if (!copy) goto done;
-  s.tree.order = batten_alloc_array(ctx, triangle_count, sizeof *s.tree.order);
-  if (!s.tree.order) goto done;
-  s.hit = batten_alloc_array(ctx, triangle_count, 1);
-  if (!s.hit) goto done;
-  for (uint32_t t = 0; t < triangle_count; t++) {
-    corners c;
-    int x, y;
-    s.hit[t] = 0;
-    triangle_corners(&s.tree, t, c);
-    if (projection(c[0], c[1], c[2], &x, &y)) s.tree.order[s.tree.count++] = t; /* those without area stay out */
-  }
-  size_t tasks = (s.tree.count + TASK_TRIANGLES - 1) / TASK_TRIANGLES, total = 0;
-  s.tree.nodes = batten_alloc_array(ctx, s.tree.count + 1, sizeof *s.tree.nodes);
-  if (!s.tree.nodes) goto done;
+  search s = {
+      .source = vertices, .triangles = triangles, .vertex_count = vertex_count, .triangle_count = triangle_count};
+  size_t total = 0;
+  batten_status st = batten_progress(ctx, "crossings", 0);
+  if (st >= 0) st = take_scaled(ctx, &s);
+  if (st >= 0) st = take_triangles(ctx, &s);
+  if (st < 0) goto done;
+  size_t tasks = (((size_t)1 << s.depth) + TASK_LEAVES - 1) / TASK_LEAVES;
+  st = BATTEN_E_NOMEM;
   s.pairs = batten_alloc_array(ctx, tasks, sizeof *s.pairs);
   if (!s.pairs) goto done;
-  if (s.tree.count) build(&s.tree);
-  batten_parallel(ctx, tasks, search_task, &s);
-  for (size_t i = 0; i < tasks; i++) total += s.pairs[i];
-  if (marks && triangle_count) memcpy(marks, s.hit, triangle_count);
+  st = s.count ? search_all(ctx, &s, tasks, &total) : BATTEN_OK;
+  if (st < 0) goto done;
+  for (size_t t = 0; marks && t < triangle_count; t++) marks[t] = atomic_load(s.hit + t) == 1;
   *pairs = total;
-  st = BATTEN_OK;
 done:
   batten_free(ctx, s.pairs);
-  batten_free(ctx, s.tree.nodes);
+  batten_free(ctx, s.boxes);
+  batten_free(ctx, s.order);
+  batten_free(ctx, s.items);
   batten_free(ctx, s.hit);
-  batten_free(ctx, s.tree.order);
-  batten_free(ctx, copy);
+  batten_free(ctx, s.copy);
   return st;
 }
 
