@@ -76,19 +76,23 @@ batten_status batten_reserve(batten_context *ctx, void **block, size_t *capacity
   return BATTEN_OK;
 }
 
+/* Digits that all keys share move nothing and are left out. */
 batten_status batten_sort_keys(batten_context *ctx, size_t count, uint64_t *keys) {
-  uint64_t *other = batten_alloc_array(ctx, count, sizeof *other);
+  uint64_t *other = batten_alloc_array(ctx, count, sizeof *other), *from = keys, *to = other, varying = 0;
   size_t *start = other ? batten_alloc_array(ctx, RADIX + 1, sizeof *start) : NULL;
-  for (int shift = 0; start && shift < 66; shift += RADIX_BITS) { /* six passes: an even number */
+  for (size_t i = 1; i < count; i++) varying |= keys[i] ^ keys[0];
+  for (int shift = 0; start && shift < 64; shift += RADIX_BITS) {
+    if (!(varying >> shift & (RADIX - 1))) continue;
     memset(start, 0, (RADIX + 1) * sizeof *start);
-    for (size_t i = 0; i < count; i++) start[((keys[i] >> shift) & (RADIX - 1)) + 1]++;
+    for (size_t i = 0; i < count; i++) start[((from[i] >> shift) & (RADIX - 1)) + 1]++;
     for (size_t i = 0; i < RADIX; i++) start[i + 1] += start[i];
-    for (size_t i = 0; i < count; i++) other[start[(keys[i] >> shift) & (RADIX - 1)]++] = keys[i];
-    uint64_t *t = keys;
-    keys = other;
-    other = t;
+    for (size_t i = 0; i < count; i++) to[start[(from[i] >> shift) & (RADIX - 1)]++] = from[i];
+    uint64_t *t = from;
+    from = to;
+    to = t;
   }
   batten_status st = start ? BATTEN_OK : BATTEN_E_NOMEM;
+  if (start && from != keys && count) memcpy(keys, from, count * sizeof *keys);
   batten_free(ctx, start);
   batten_free(ctx, other);
   return st;

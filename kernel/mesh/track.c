@@ -14,7 +14,10 @@
  * tetrahedron has one piece of one or two triangles, and the pieces fit to an oriented manifold by construction.
  *
  * A front of tetrahedra grows through faces that the surface crosses; all new nodes of a front are evaluated in one
- * batch. The crossed tetrahedra are sorted at the end: the surface found does not depend on the way to it. */
+ * batch. The crossed tetrahedra are sorted at the end: the surface found does not depend on the way to it.
+ *
+ * What is known of nodes and tetrahedra lies in bricks of two cubes a side, so that what is near in space is near in
+ * memory, and only bricks are looked for in a table. */
 #include "track.h"
 
 #include "base/checked.h"
@@ -27,23 +30,39 @@ enum {
   COORDINATE_BITS = 20,
   CUBES_MAX = 1 << (COORDINATE_BITS - 2), /* along an axis; doubled coordinates then fit with room to spare */
   SEED_REACH = 2,                         /* cubes around a seed in which the surface is looked for */
+  PROGRESS_STEP = 1 << 16,                /* tetrahedra between two calls of progress */
 };
 
 /* Crossings keep this share of their edge from its ends: no piece is degenerate. */
 static const double END_MARGIN = 0.15;
+
+/* Coordinates in a brick are 0 .. 3, and their halves say the place among the 8 of a kind. Nodes: cube corners, cube
+ * centres, and those drawn back to a face of the box, which have the parities of face centres. */
+enum { BRICK_BITS = 2, NODE_KINDS = 5, FACE_KINDS = 3, PLACES = 8 };
+
+typedef struct brick {
+  uint32_t nodes[NODE_KINDS * PLACES];         /* NO_NODE: none */
+  unsigned char seen[FACE_KINDS * PLACES / 2]; /* four bits for each face: its tetrahedra */
+  unsigned char crossed[FACE_KINDS * PLACES / 2];
+} brick;
+
+#define NO_NODE UINT32_MAX
 
 typedef struct tracker {
   batten_sampler *sampler;
   batten_context *ctx;
   double lower[3], upper[3], half[3]; /* half: length of one doubled step */
   int32_t limit[3];                   /* doubled coordinates run from 0 to limit */
-  batten_table nodes;                 /* packed coordinates -> node */
+  batten_table places;                /* packed coordinates of a brick -> its number */
+  brick *bricks;
+  size_t brick_capacity;
+  uint64_t last_keys[8]; /* bricks looked for last, one for each parity of their coordinates: a neighbourhood */
+  uint32_t last_places[8];
   size_t node_count, evaluated;
   uint64_t *node_keys;
   size_t node_keys_capacity;
   double *values;
   size_t values_capacity;
-  batten_table tetrahedra; /* seen ones -> crossed or not */
   uint64_t *front, *next, *crossed;
   size_t front_count, next_count, crossed_count, front_capacity, next_capacity, crossed_capacity;
   uint32_t *front_nodes; /* [front][4] */
@@ -122,12 +141,85 @@ static void node_position(const tracker *tr, uint64_t key, double *x) {
   for (int k = 0; k < 3; k++) x[k] = c[k] == tr->limit[k] ? tr->upper[k] : tr->lower[k] + c[k] * tr->half[k];
 }
 
+/* ---- bricks ------------------------------------------------------------------------------------- */
+
+static uint64_t brick_key(const int32_t *c, unsigned *parity) {
+  const int32_t b[3] = {c[0] >> BRICK_BITS, c[1] >> BRICK_BITS, c[2] >> BRICK_BITS};
+  *parity = (unsigned)((b[0] & 1) << 2 | (b[1] & 1) << 1 | (b[2] & 1));
+  return pack(b);
+}
+
+/* Of the 8 places of the coordinates' parities, and those: bit 2 for c[0], as the places. */
+static unsigned brick_place(const int32_t *c) {
+  return (unsigned)((c[0] >> 1 & 1) << 2 | (c[1] >> 1 & 1) << 1 | (c[2] >> 1 & 1));
+}
+static unsigned parities(const int32_t *c) { return (unsigned)((c[0] & 1) << 2 | (c[1] & 1) << 1 | (c[2] & 1)); }
+
+static unsigned node_slot(const int32_t *c) {
+  static const unsigned char kind[8] = {0, 0, 0, 2, 0, 3, 4, 1}; /* 0: even, 7: odd, 3 5 6: one of them even */
+  return kind[parities(c)] * PLACES + brick_place(c);
+}
+
+/* The byte of a tetrahedron's face and the bit in it. */
+static unsigned face_bit(uint64_t number, const int32_t *c, unsigned char *bit) {
+  static const unsigned char kind[8] = {0, 0, 0, 0, 0, 1, 2, 0}; /* 3 5 6 */
+  unsigned face = kind[parities(c)] * PLACES + brick_place(c);
+  *bit = (unsigned char)(1u << (4 * (face & 1) + (number & 3)));
+  return face / 2;
+}
+
+/* The brick around c; valid until the next one is added. */
+static brick *find_brick(tracker *tr, const int32_t *c) {
+  unsigned parity;
+  uint64_t key = brick_key(c, &parity);
+  if (tr->last_keys[parity] == key) return tr->bricks + tr->last_places[parity];
+  const uint32_t *place = batten_table_find(&tr->places, key);
+  if (!place) return NULL;
+  tr->last_keys[parity] = key;
+  tr->last_places[parity] = *place;
+  return tr->bricks + *place;
+}
+
+/* And added when it is not there; NULL: out of memory. */
+static brick *take_brick(tracker *tr, const int32_t *c) {
+  unsigned parity;
+  size_t count = tr->places.count;
+  brick *b = find_brick(tr, c);
+  if (b) return b;
+  if (batten_reserve(tr->ctx, (void **)&tr->bricks, &tr->brick_capacity, count + 1, sizeof *tr->bricks) < 0 ||
+      !batten_table_insert(tr->ctx, &tr->places, brick_key(c, &parity), (uint32_t)count, NULL))
+    return NULL;
+  b = tr->bricks + count;
+  *b = (brick){.seen = {0}};
+  memset(b->nodes, 0xff, sizeof b->nodes);
+  return b;
+}
+
+static bool is_crossed(tracker *tr, uint64_t number) {
+  int32_t c[3];
+  unsigned char bit;
+  unpack(number >> 2, c);
+  const brick *b = find_brick(tr, c);
+  return b && b->crossed[face_bit(number, c, &bit)] & bit;
+}
+
+static uint32_t find_node(tracker *tr, uint64_t key) {
+  int32_t c[3];
+  unpack(key, c);
+  return find_brick(tr, c)->nodes[node_slot(c)];
+}
+
 /* ---- the front ---------------------------------------------------------------------------------- */
 
 static batten_status push(tracker *tr, uint64_t number) {
-  int is_new;
-  if (!batten_table_insert(tr->ctx, &tr->tetrahedra, number, 0, &is_new)) return BATTEN_E_NOMEM;
-  if (!is_new) return BATTEN_OK;
+  int32_t c[3];
+  unsigned char bit;
+  unpack(number >> 2, c);
+  brick *b = take_brick(tr, c);
+  if (!b) return BATTEN_E_NOMEM;
+  unsigned byte = face_bit(number, c, &bit);
+  if (b->seen[byte] & bit) return BATTEN_OK;
+  b->seen[byte] |= bit;
   if (batten_reserve(tr->ctx, (void **)&tr->next, &tr->next_capacity, tr->next_count + 1, sizeof *tr->next) < 0)
     return BATTEN_E_NOMEM;
   tr->next[tr->next_count++] = number;
@@ -135,18 +227,21 @@ static batten_status push(tracker *tr, uint64_t number) {
 }
 
 static batten_status add_node(tracker *tr, uint64_t key, uint32_t *node) {
-  int is_new;
+  int32_t c[3];
   if (tr->node_count >= UINT32_MAX)
     return batten_fail(tr->ctx, BATTEN_E_TOO_LARGE, "opt.cell: %zu lattice nodes are too many; enlarge it",
                        tr->node_count);
-  uint32_t *place = batten_table_insert(tr->ctx, &tr->nodes, key, (uint32_t)tr->node_count, &is_new);
-  if (!place) return BATTEN_E_NOMEM;
+  unpack(key, c);
+  brick *b = take_brick(tr, c);
+  if (!b) return BATTEN_E_NOMEM;
+  uint32_t *place = b->nodes + node_slot(c);
   *node = *place;
-  if (!is_new) return BATTEN_OK;
+  if (*place != NO_NODE) return BATTEN_OK;
   if (batten_reserve(tr->ctx, (void **)&tr->node_keys, &tr->node_keys_capacity, tr->node_count + 1,
                      sizeof *tr->node_keys) < 0)
     return BATTEN_E_NOMEM;
-  tr->node_keys[tr->node_count++] = key;
+  tr->node_keys[tr->node_count] = key;
+  *node = *place = (uint32_t)tr->node_count++;
   return BATTEN_OK;
 }
 
@@ -162,6 +257,12 @@ static batten_status evaluate_new_nodes(tracker *tr) {
   if (st < 0) return st;
   tr->evaluated = tr->node_count;
   return BATTEN_OK;
+}
+
+/* How large the surface is nobody knows beforehand: the front's share of what is found says how much is left. */
+static batten_status report(tracker *tr) {
+  double found = (double)tr->crossed_count, left = (double)tr->next_count;
+  return batten_progress(tr->ctx, "surface", found > 0 ? found / (found + 4 * left + 1) : 0);
 }
 
 /* The next front becomes the front; its nodes get their numbers. */
@@ -180,9 +281,11 @@ static batten_status take_front(tracker *tr) {
   for (size_t i = 0; i < tr->front_count; i++) {
     tetrahedron t = tetrahedron_of(tr->front[i]);
     uint64_t keys[4];
+    batten_status st = i % PROGRESS_STEP == 0 ? report(tr) : BATTEN_OK;
+    if (st < 0) return st;
     tetrahedron_nodes(tr, &t, keys);
     for (size_t j = 0; j < 4; j++) {
-      batten_status st = add_node(tr, keys[j], tr->front_nodes + 4 * i + j);
+      st = add_node(tr, keys[j], tr->front_nodes + 4 * i + j);
       if (st < 0) return st;
     }
   }
@@ -194,12 +297,14 @@ static batten_status cross_one(tracker *tr, uint64_t number, const uint32_t *nod
   int count = 0;
   for (int j = 0; j < 4; j++) count += inside[j] = tr->values[nodes[j]] >= 0;
   if (count == 0 || count == 4) return BATTEN_OK;
-  *batten_table_find(&tr->tetrahedra, number) = 1;
+  tetrahedron t = tetrahedron_of(number);
+  unsigned char bit;
+  unsigned byte = face_bit(number, t.c, &bit);
+  find_brick(tr, t.c)->crossed[byte] |= bit;
   if (batten_reserve(tr->ctx, (void **)&tr->crossed, &tr->crossed_capacity, tr->crossed_count + 1,
                      sizeof *tr->crossed) < 0)
     return BATTEN_E_NOMEM;
   tr->crossed[tr->crossed_count++] = number;
-  tetrahedron t = tetrahedron_of(number);
   for (int j = 0; j < 4; j++) {
     int others = count - inside[j]; /* inside nodes of the face opposite node j */
     uint64_t beyond;
@@ -213,11 +318,11 @@ static batten_status run_fronts(tracker *tr) {
   while (tr->next_count > 0) {
     batten_status st = take_front(tr);
     if (st >= 0) st = evaluate_new_nodes(tr);
-    for (size_t i = 0; st >= 0 && i < tr->front_count; i++) st = cross_one(tr, tr->front[i], tr->front_nodes + 4 * i);
-    if (st < 0) return st;
-    /* How large the surface is nobody knows beforehand: the front's share of what is found says how much is left. */
-    double found = (double)tr->crossed_count, left = (double)tr->next_count;
-    st = batten_progress(tr->ctx, "surface", found > 0 ? found / (found + 4 * left + 1) : 0);
+    for (size_t i = 0; st >= 0 && i < tr->front_count; i++) {
+      if (i % PROGRESS_STEP == 0) st = report(tr);
+      if (st >= 0) st = cross_one(tr, tr->front[i], tr->front_nodes + 4 * i);
+    }
+    if (st >= 0) st = report(tr);
     if (st < 0) return st;
   }
   return BATTEN_OK;
@@ -272,9 +377,22 @@ static int visit_around(tracker *tr, const int32_t *cube, int32_t reach, int (*v
 
 static int visit_push(tracker *tr, uint64_t number) { return push(tr, number) < 0; }
 
-static int visit_crossed(tracker *tr, uint64_t number) {
-  uint32_t *state = batten_table_find(&tr->tetrahedra, number);
-  return state && *state;
+static int visit_crossed(tracker *tr, uint64_t number) { return is_crossed(tr, number); }
+
+/* The tetrahedra that hold the seeds, in the order of the lattice: neighbours then come one after the other. */
+static batten_status push_seeds(tracker *tr, size_t seed_count, const double *seeds) {
+  int32_t cube[3];
+  double offset[3];
+  size_t count = 0;
+  uint64_t *numbers = batten_alloc_array(tr->ctx, seed_count, sizeof *numbers);
+  if (!numbers) return BATTEN_E_NOMEM;
+  for (size_t i = 0; i < seed_count; i++)
+    if (seed_cube(tr, seeds + 3 * i, cube, offset)) numbers[count++] = seed_tetrahedron(cube, offset);
+  batten_status st = batten_sort_keys(tr->ctx, count, numbers);
+  for (size_t i = 0; st >= 0 && i < count; i++)
+    if (i == 0 || numbers[i] != numbers[i - 1]) st = push(tr, numbers[i]);
+  batten_free(tr->ctx, numbers);
+  return st;
 }
 
 /* Level by level: the tetrahedra that hold the seeds, then for seeds that found nothing their cubes, then the cubes
@@ -282,12 +400,9 @@ static int visit_crossed(tracker *tr, uint64_t number) {
 static batten_status run_seeds(tracker *tr, size_t seed_count, const double *seeds, unsigned char *missed) {
   int32_t cube[3];
   double offset[3];
-  for (size_t i = 0; i < seed_count; i++) {
-    missed[i] = 1;
-    if (seed_cube(tr, seeds + 3 * i, cube, offset) && push(tr, seed_tetrahedron(cube, offset)) < 0)
-      return BATTEN_E_NOMEM;
-  }
-  batten_status st = run_fronts(tr);
+  memset(missed, 1, seed_count);
+  batten_status st = push_seeds(tr, seed_count, seeds);
+  if (st >= 0) st = run_fronts(tr);
   for (size_t i = 0; st >= 0 && i < seed_count; i++)
     if (seed_cube(tr, seeds + 3 * i, cube, offset)) missed[i] = !visit_crossed(tr, seed_tetrahedron(cube, offset));
   for (int32_t reach = 0; reach <= SEED_REACH; reach++) {
@@ -304,8 +419,12 @@ static batten_status run_seeds(tracker *tr, size_t seed_count, const double *see
 
 /* ---- extraction --------------------------------------------------------------------------------- */
 
+enum { NODE_EDGES = 7 }; /* of the 14 at a node within the box those to nodes with higher keys */
+#define NO_VERTEX UINT32_MAX
+
 typedef struct extraction {
-  batten_table edges; /* the two nodes of a crossed edge -> vertex */
+  uint32_t (*vertex_of)[NODE_EDGES]; /* [nodes] by the node with the lower key; NO_VERTEX */
+  batten_table edges;                /* the two nodes of other crossed edges (on faces of the box) -> vertex */
   batten_rough_surface surface;
   size_t vertex_capacity, face_capacity, triangle_capacity;
 } extraction;
@@ -333,14 +452,40 @@ static void place_vertex(const tracker *tr, uint32_t a, uint32_t b, double *x, u
   }
 }
 
+/* Number of the edge among those of its lower node, or -1: steps 2 0 0 and 1 +-1 +-1 from there. */
+static int edge_number(uint64_t lower, uint64_t higher) {
+  int32_t from[3], to[3];
+  unpack(lower, from);
+  unpack(higher, to);
+  const int32_t d[3] = {to[0] - from[0], to[1] - from[1], to[2] - from[2]};
+  if (d[0] == 1 && d[1] && d[2]) return 3 + (d[1] > 0) + 2 * (d[2] > 0);
+  for (int k = 0; k < 3; k++)
+    if (d[k] == 2) return k;
+  return -1;
+}
+
+/* Where the number of the edge's vertex stands, `fresh` and *is_new when there was none; NULL: out of memory. */
+static uint32_t *find_vertex(tracker *tr, extraction *e, uint32_t a, uint32_t b, uint32_t fresh, int *is_new) {
+  if (tr->node_keys[a] > tr->node_keys[b]) {
+    uint32_t t = a;
+    a = b;
+    b = t;
+  }
+  int number = edge_number(tr->node_keys[a], tr->node_keys[b]);
+  if (number < 0) return batten_table_insert(tr->ctx, &e->edges, (uint64_t)a << 32 | b, fresh, is_new);
+  uint32_t *place = &e->vertex_of[a][number];
+  *is_new = *place == NO_VERTEX;
+  if (*is_new) *place = fresh;
+  return place;
+}
+
 static batten_status add_vertex(tracker *tr, extraction *e, uint32_t a, uint32_t b, uint32_t *vertex) {
   batten_rough_surface *s = &e->surface;
   int is_new;
-  uint64_t key = a < b ? (uint64_t)a << 32 | b : (uint64_t)b << 32 | a;
   if (s->vertex_count >= UINT32_MAX - 1)
     return batten_fail(tr->ctx, BATTEN_E_TOO_LARGE, "opt.cell: %zu vertices are too many; enlarge it",
                        s->vertex_count);
-  uint32_t *place = batten_table_insert(tr->ctx, &e->edges, key, (uint32_t)s->vertex_count, &is_new);
+  const uint32_t *place = find_vertex(tr, e, a, b, (uint32_t)s->vertex_count, &is_new);
   if (!place) return BATTEN_E_NOMEM;
   *vertex = *place;
   if (!is_new) return BATTEN_OK;
@@ -365,7 +510,7 @@ static batten_status extract_one(tracker *tr, extraction *e, uint64_t number) {
   unsigned inside = 0, count = 0;
   tetrahedron_nodes(tr, &t, keys);
   for (int i = 0; i < 4; i++) {
-    node[i] = *batten_table_find(&tr->nodes, keys[i]);
+    node[i] = find_node(tr, keys[i]);
     if (tr->values[node[i]] >= 0) {
       inside |= 1u << i;
       count++;
@@ -402,8 +547,14 @@ static batten_status extract_one(tracker *tr, extraction *e, uint64_t number) {
 }
 
 static batten_status extract(tracker *tr, extraction *e) {
+  e->vertex_of = batten_alloc_array(tr->ctx, tr->node_count, sizeof *e->vertex_of);
+  if (!e->vertex_of) return BATTEN_E_NOMEM;
+  memset(e->vertex_of, 0xff, tr->node_count * sizeof *e->vertex_of);
   batten_status st = batten_sort_keys(tr->ctx, tr->crossed_count, tr->crossed);
-  for (size_t i = 0; st >= 0 && i < tr->crossed_count; i++) st = extract_one(tr, e, tr->crossed[i]);
+  for (size_t i = 0; st >= 0 && i < tr->crossed_count; i++) {
+    if (i % PROGRESS_STEP == 0) st = batten_progress(tr->ctx, "surface", 1);
+    if (st >= 0) st = extract_one(tr, e, tr->crossed[i]);
+  }
   if (st >= 0 && e->surface.triangle_count > (UINT32_MAX - 1) / 3)
     st = batten_fail(tr->ctx, BATTEN_E_TOO_LARGE, "opt.cell: %zu triangles are too many; enlarge it",
                      e->surface.triangle_count);
@@ -439,6 +590,7 @@ batten_status batten_track_surface(batten_sampler *sampler, const double *lower,
                                    size_t seed_count, const double *seeds, batten_rough_surface *out) {
   batten_context *ctx = sampler->ctx;
   tracker tr = {.sampler = sampler, .ctx = ctx};
+  memset(tr.last_keys, 0xff, sizeof tr.last_keys); /* of no brick */
   extraction e = {.surface = {0}};
   unsigned char *missed = NULL;
   batten_status st = fit_lattice(&tr, lower, upper, cell);
@@ -456,14 +608,20 @@ batten_status batten_track_surface(batten_sampler *sampler, const double *lower,
                      SEED_REACH, seed_count);
     goto done;
   }
+  batten_free(ctx, tr.front); /* no need of them while the triangles are made */
+  batten_free(ctx, tr.next);
+  batten_free(ctx, tr.front_nodes);
+  tr.front = tr.next = NULL;
+  tr.front_nodes = NULL;
   st = extract(&tr, &e);
   if (st < 0) goto done;
   *out = e.surface;
 done:
   if (st < 0) batten_rough_surface_free(ctx, &e.surface);
   batten_table_free(ctx, &e.edges);
-  batten_table_free(ctx, &tr.nodes);
-  batten_table_free(ctx, &tr.tetrahedra);
+  batten_free(ctx, e.vertex_of);
+  batten_table_free(ctx, &tr.places);
+  batten_free(ctx, tr.bricks);
   batten_free(ctx, tr.node_keys);
   batten_free(ctx, tr.values);
   batten_free(ctx, tr.front);
