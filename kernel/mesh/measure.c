@@ -35,8 +35,8 @@ static frame box_of(const batten_mesh *mesh, batten_mesh_measures *m) {
   for (size_t h = 0; h < 3 * mesh->triangle_count; h++) {
     const double *p = mesh->vertices + 3 * (size_t)mesh->triangles[h];
     for (int k = 0; k < 3; k++) {
-      m->lower[k] = fmin(m->lower[k], p[k]);
-      m->upper[k] = fmax(m->upper[k], p[k]);
+      if (p[k] < m->lower[k]) m->lower[k] = p[k];
+      if (p[k] > m->upper[k]) m->upper[k] = p[k];
     }
   }
   double size = 0;
@@ -82,14 +82,54 @@ static void add_angles(const double *const *p, sums *s) {
   s->good_triangles += least >= 20;
 }
 
-static void add_triangles(const batten_mesh *mesh, const frame *f, sums *s) {
-  for (size_t t = 0; t < mesh->triangle_count; t++) {
+enum { TASK = 8192 };
+
+typedef struct triangle_work {
+  const batten_mesh *mesh;
+  const frame *f;
+  sums *parts; /* [tasks] */
+} triangle_work;
+
+static void triangle_task(void *arg, size_t task) {
+  const triangle_work *w = arg;
+  const batten_mesh *mesh = w->mesh;
+  const double scale = ldexp(1, -w->f->exponent / 2), rest = ldexp(1, -w->f->exponent - -w->f->exponent / 2);
+  sums s = {.angle_min = INFINITY, .edge_min = INFINITY};
+  size_t end = (task + 1) * TASK < mesh->triangle_count ? (task + 1) * TASK : mesh->triangle_count;
+  for (size_t t = task * TASK; t < end; t++) {
     double p[3][3];
-    for (int k = 0; k < 3; k++) to_frame(f, mesh->vertices + 3 * (size_t)mesh->triangles[3 * t + (size_t)k], p[k]);
+    for (size_t k = 0; k < 3; k++) {
+      const double *x = mesh->vertices + 3 * (size_t)mesh->triangles[3 * t + k];
+      for (int d = 0; d < 3; d++) p[k][d] = (x[d] - w->f->middle[d]) * scale * rest; /* one factor might overflow */
+    }
     const double *corners[3] = {p[0], p[1], p[2]};
-    add_integrals(p[0], p[1], p[2], s);
-    add_angles(corners, s);
+    add_integrals(p[0], p[1], p[2], &s);
+    add_angles(corners, &s);
   }
+  w->parts[task] = s;
+}
+
+static void add_sums(const sums *part, sums *s) {
+  s->area += part->area;
+  s->volume += part->volume;
+  for (int k = 0; k < 3; k++) {
+    s->area_moment[k] += part->area_moment[k];
+    s->volume_moment[k] += part->volume_moment[k];
+    for (int l = 0; l < 3; l++) s->volume_second[k][l] += part->volume_second[k][l];
+  }
+  s->angle_min = fmin(s->angle_min, part->angle_min);
+  s->angle_max = fmax(s->angle_max, part->angle_max);
+  s->good_triangles += part->good_triangles;
+}
+
+static batten_status add_triangles(batten_context *ctx, const batten_mesh *mesh, const frame *f, sums *s) {
+  size_t tasks = (mesh->triangle_count + TASK - 1) / TASK;
+  triangle_work w = {mesh, f, batten_alloc_array(ctx, tasks, sizeof *w.parts)};
+  if (!w.parts) return BATTEN_E_NOMEM;
+  batten_parallel(ctx, tasks, triangle_task, &w);
+  for (size_t i = 0; i < tasks; i++) add_sums(w.parts + i, s);
+  batten_free(ctx, w.parts);
+  return BATTEN_OK;
 }
 
 /* Each edge once: order brings the half-edges of an edge together. */
@@ -168,17 +208,22 @@ batten_status batten_mesh_measure(batten_context *ctx, const batten_mesh *mesh, 
   batten_mesh_topology topology;
   sums s = {.angle_min = INFINITY, .edge_min = INFINITY};
   uint32_t *order = NULL;
-  batten_status st =
-      batten_mesh_find_topology(ctx, mesh->vertex_count, mesh->triangle_count, mesh->triangles, &topology);
+  batten_status st = batten_progress(ctx, "measure", 0);
   if (st < 0) goto done;
   st = BATTEN_E_NOMEM;
   order = batten_alloc_array(ctx, mesh->triangle_count, 3 * sizeof *order);
   if (!order) goto done;
   st = batten_mesh_sort_edges(ctx, mesh->vertex_count, mesh->triangle_count, mesh->triangles, order);
+  if (st >= 0) st = batten_progress(ctx, "measure", 0.3);
+  if (st >= 0)
+    st = batten_mesh_topology_of_edges(ctx, mesh->vertex_count, mesh->triangle_count, mesh->triangles, order,
+                                       &topology);
+  if (st >= 0) st = batten_progress(ctx, "measure", 0.7);
   if (st < 0) goto done;
   set_topology(&topology, mesh->triangle_count, &m);
   frame f = box_of(mesh, &m);
-  add_triangles(mesh, &f, &s);
+  st = add_triangles(ctx, mesh, &f, &s);
+  if (st < 0) goto done;
   add_edges(mesh, order, &f, &s);
   set_figures(mesh, &s, &f, &m);
   *out = m;

@@ -56,7 +56,6 @@ static size_t count_roots(size_t count, const uint32_t *parent) {
 /* ---- edges -------------------------------------------------------------------------------------- */
 
 typedef struct scratch {
-  uint32_t *order;     /* [3 F] half-edges, those of one edge together */
   uint32_t *triangle;  /* [F] disjoint sets: components */
   uint32_t *corner;    /* [3 F] disjoint sets: fans */
   uint32_t *loop;      /* [3 F] disjoint sets of boundary half-edges; MESH_NONE for others */
@@ -113,31 +112,30 @@ static void count_vertices(size_t vertex_count, const uint32_t *triangles, size_
   }
 }
 
-batten_status batten_mesh_find_topology(batten_context *ctx, size_t vertex_count, size_t triangle_count,
-                                        const uint32_t *triangles, batten_mesh_topology *out) {
+batten_status batten_mesh_topology_of_edges(batten_context *ctx, size_t vertex_count, size_t triangle_count,
+                                            const uint32_t *triangles, const uint32_t *order,
+                                            batten_mesh_topology *out) {
   size_t half_edges = 3 * triangle_count;
   batten_status st = BATTEN_E_NOMEM;
   batten_mesh_topology t = {.oriented = 1};
   scratch s = {0};
   uint32_t *fans = batten_alloc_array(ctx, vertex_count, sizeof *fans);
-  if (!fans || !(s.order = batten_alloc_array(ctx, half_edges, sizeof *s.order)) ||
-      !(s.triangle = batten_alloc_array(ctx, triangle_count, sizeof *s.triangle)) ||
+  if (!fans || !(s.triangle = batten_alloc_array(ctx, triangle_count, sizeof *s.triangle)) ||
       !(s.corner = batten_alloc_array(ctx, half_edges, sizeof *s.corner)) ||
       !(s.loop = batten_alloc_array(ctx, half_edges, sizeof *s.loop)) ||
       !(s.fan_entry = batten_alloc_array(ctx, half_edges, sizeof *s.fan_entry)))
     goto done;
-  st = batten_mesh_sort_edges(ctx, vertex_count, triangle_count, triangles, s.order);
-  if (st < 0) goto done;
+  st = BATTEN_OK;
   sets_start(triangle_count, s.triangle);
   sets_start(half_edges, s.corner);
   for (uint32_t h = 0; h < half_edges; h++) s.loop[h] = s.fan_entry[h] = MESH_NONE;
   for (size_t i = 0, n; i < half_edges; i += n) {
-    uint32_t low = lower_end(triangles, s.order[i]), high = higher_end(triangles, s.order[i]);
+    uint32_t low = lower_end(triangles, order[i]), high = higher_end(triangles, order[i]);
     n = 1;
-    while (i + n < half_edges && lower_end(triangles, s.order[i + n]) == low &&
-           higher_end(triangles, s.order[i + n]) == high)
+    while (i + n < half_edges && lower_end(triangles, order[i + n]) == low &&
+           higher_end(triangles, order[i + n]) == high)
       n++;
-    join_edge(triangles, s.order + i, n, &s, &t);
+    join_edge(triangles, order + i, n, &s, &t);
   }
   join_loops(triangles, half_edges, &s);
   count_vertices(vertex_count, triangles, half_edges, &s, fans, &t);
@@ -149,7 +147,16 @@ done:
   batten_free(ctx, s.loop);
   batten_free(ctx, s.corner);
   batten_free(ctx, s.triangle);
-  batten_free(ctx, s.order);
   batten_free(ctx, fans);
+  return st;
+}
+
+batten_status batten_mesh_find_topology(batten_context *ctx, size_t vertex_count, size_t triangle_count,
+                                        const uint32_t *triangles, batten_mesh_topology *out) {
+  uint32_t *order = batten_alloc_array(ctx, triangle_count, 3 * sizeof *order);
+  batten_status st =
+      order ? batten_mesh_sort_edges(ctx, vertex_count, triangle_count, triangles, order) : BATTEN_E_NOMEM;
+  if (st >= 0) st = batten_mesh_topology_of_edges(ctx, vertex_count, triangle_count, triangles, order, out);
+  batten_free(ctx, order);
   return st;
 }

@@ -15,4 +15,9 @@ typedef struct batten_mesh_topology {
 batten_status batten_mesh_find_topology(batten_context *ctx, size_t vertex_count, size_t triangle_count,
                                         const uint32_t *triangles, batten_mesh_topology *out);
 
+/* The same with order [3 F] as batten_mesh_sort_edges gives it. */
+batten_status batten_mesh_topology_of_edges(batten_context *ctx, size_t vertex_count, size_t triangle_count,
+                                            const uint32_t *triangles, const uint32_t *order,
+                                            batten_mesh_topology *out);
+
 #endif
