@@ -5,8 +5,8 @@
 #include "sampler.h"
 #include "surface.h"
 
-/* Rounds of split, collapse, flip and tangential smoothing towards edges of the length `edge`; every second one ends
- * with a Newton step on the field. Vertices stay in the box. */
+/* Rounds of split, collapse, flip and tangential smoothing towards edges of the length `edge`; every second one takes
+ * vertices that may have left f = 0 back to it by a Newton step. Vertices stay in the box. */
 batten_status mesh_surface_improve(mesh_surface *s, batten_sampler *sampler, const double *lower, const double *upper,
                                    double edge, unsigned rounds);
 

@@ -199,19 +199,31 @@ batten_status batten_polygonize_warn(batten_context *ctx, const batten_polygoniz
   return BATTEN_OK;
 }
 
+/* Takes away what only changes need. */
+static void mesh_surface_trim(mesh_surface *s) {
+  void **blocks[] = {(void **)&s->normals, (void **)&s->out, (void **)&s->twin, (void **)&s->sharp,
+                     (void **)&s->drift};
+  for (size_t i = 0; i < sizeof blocks / sizeof *blocks; i++) {
+    batten_free(s->ctx, *blocks[i]);
+    *blocks[i] = NULL;
+  }
+}
+
 static batten_status count_crossings(const mesh_surface *s, size_t *pairs) {
   return batten_mesh_find_crossings(s->ctx, s->vertex_count, s->points, s->triangle_count, s->origin, NULL, pairs);
 }
 
 typedef struct avoided {
   size_t count;
-  double *places; /* [count][3] */
+  double *places;    /* [count][3] */
+  batten_tree *tree; /* of these; NULL: there are none */
 } avoided;
 
 /* Adds corners of triangles that cross others; *fresh: how many of them no crease was kept away from before. */
 static batten_status add_crossings(const mesh_surface *s, double edge, avoided *a, size_t *fresh, size_t *pairs) {
   batten_context *ctx = s->ctx;
-  size_t marked = 0, before = a->count;
+  const size_t before = a->count;
+  size_t marked = 0;
   *fresh = *pairs = 0;
   unsigned char *marks = batten_alloc_array(ctx, s->triangle_count, 1);
   batten_status st =
@@ -224,11 +236,14 @@ static batten_status add_crossings(const mesh_surface *s, double edge, avoided *
   for (size_t t = 0; grown && t < s->triangle_count; t++) {
     const double *x = s->points + 3 * (size_t)s->origin[3 * t];
     if (!marks[t]) continue;
-    *fresh += !mesh_surface_avoids(x, edge, before, grown);
+    *fresh += !mesh_surface_is_near(x, edge, a->tree);
     memcpy(grown + 3 * a->count++, x, 3 * sizeof *grown);
   }
   batten_free(ctx, marks);
-  return st;
+  if (st < 0 || a->count == before) return st;
+  batten_tree_free(ctx, a->tree);
+  a->tree = NULL;
+  return batten_tree_new(ctx, 3, a->count, a->places, &a->tree);
 }
 
 /* Makes the settled surface follow its creases. Where that makes it cross itself it is tried again without these
@@ -249,7 +264,7 @@ static batten_status sharpen(batten_sampler *sampler, const batten_frame *frame,
     st = mesh_surface_copy(surface, &sharp);
     if (st >= 0)
       st = mesh_surface_sharpen(&sharp, sampler, frame->lower, frame->upper, edge, opt->sharp_deg * DEGREE,
-                                avoid.count, avoid.places, &count);
+                                avoid.tree, &count);
     if (st >= 0 && count) st = mesh_surface_settle(&sharp, sampler, edge, tolerance, &distance);
     if (st >= 0 && count) st = add_crossings(&sharp, edge, &avoid, &fresh, &pairs);
     if (st >= 0 && !fresh && pairs <= 2 * info->self_intersections && count &&
@@ -262,6 +277,7 @@ static batten_status sharpen(batten_sampler *sampler, const batten_frame *frame,
     }
     mesh_surface_free(&sharp);
   }
+  batten_tree_free(sampler->ctx, avoid.tree);
   batten_free(sampler->ctx, avoid.places);
   return st;
 }
@@ -334,8 +350,10 @@ batten_status batten_polygonize(batten_context *ctx, const batten_field *field, 
   st = make_surface(&sampler, &frame, seed_count, seeds, &o, &surface, &found);
   batten_free(ctx, searched);
   found.evaluations = sampler.evaluations;
-  if (st >= 0)
+  if (st >= 0) {
+    mesh_surface_trim(&surface);
     st = batten_mesh_create(ctx, surface.vertex_count, surface.points, surface.triangle_count, surface.origin, out);
+  }
   mesh_surface_free(&surface);
   if (st < 0) return st;
   if (info) *info = found;

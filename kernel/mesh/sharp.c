@@ -16,6 +16,7 @@
 #include "project.h"
 #include "vec.h"
 
+#include <stdlib.h>
 #include <string.h>
 
 static const double CANDIDATE = 0.7;                 /* of the angle: between the normals at the ends of an edge */
@@ -108,8 +109,7 @@ typedef struct sharpener {
   mesh_surface *s;
   batten_sampler *sampler;
   double edge, angle;
-  const double *avoid; /* [avoid_count][3] places to leave as they are */
-  size_t avoid_count;
+  const batten_tree *avoid; /* places to leave as they are */
   size_t crossing_count, centre_count, link_count;
   uint32_t *crossing_of;    /* [3 T] number of the crossing at a half-edge, or MESH_NONE */
   batten_crease *crossings; /* of creases and edges */
@@ -149,10 +149,14 @@ static batten_status take_normals(mesh_surface *s, batten_sampler *sampler) {
   return st;
 }
 
-bool mesh_surface_avoids(const double *x, double edge, size_t count, const double *places) {
-  for (size_t i = 0; i < count; i++)
-    if (vec_distance(x, places + 3 * i) < AVOID * edge) return true;
-  return false;
+static bool has_near(const batten_tree *places, const double *x, double reach) {
+  size_t nearest;
+  double distance;
+  return places && batten_tree_nearest(places, x, 1, SIZE_MAX, &nearest, &distance) == 1 && distance < reach;
+}
+
+bool mesh_surface_is_near(const double *x, double edge, const batten_tree *places) {
+  return has_near(places, x, AVOID * edge);
 }
 
 static bool may_cross(const sharpener *w, uint32_t h) {
@@ -160,7 +164,7 @@ static bool may_cross(const sharpener *w, uint32_t h) {
   uint32_t a = s->origin[h], b = s->origin[mesh_next(h)], g = s->twin[h];
   if ((g != MESH_NONE && g < h) || is_marked(s, a) || is_marked(s, b)) return false;
   if (!(vec_dot(normal(s, a), normal(s, b)) < cos(CANDIDATE * w->angle))) return false;
-  return !mesh_surface_avoids(point(s, a), w->edge, w->avoid_count, w->avoid);
+  return !mesh_surface_is_near(point(s, a), w->edge, w->avoid);
 }
 
 /* Of a crease that is there. */
@@ -281,16 +285,24 @@ static void take_triangle(sharpener *w, uint32_t t) {
     if (k != corner) add_link(w, found[corner], found[k]);
 }
 
-/* Is there a corner or tip in the mesh near x? */
-static bool is_taken(const sharpener *w, const double *x) {
-  const mesh_surface *s = w->s;
+/* The corners and tips in the mesh. *out NULL: there are none. */
+static batten_status corner_places(const mesh_surface *s, batten_tree **out) {
+  size_t count = 0;
+  *out = NULL;
+  for (uint32_t v = 0; v < s->vertex_count; v++) count += (s->faces[v] & MESH_CORNER) != 0;
+  if (count == 0) return BATTEN_OK;
+  double *places = batten_alloc_array(s->ctx, count, 3 * sizeof *places);
+  if (!places) return BATTEN_E_NOMEM;
+  count = 0;
   for (uint32_t v = 0; v < s->vertex_count; v++)
-    if ((s->faces[v] & MESH_CORNER) && vec_distance(x, point(s, v)) < w->edge) return true;
-  return false;
+    if (s->faces[v] & MESH_CORNER) memcpy(places + 3 * count++, point(s, v), 3 * sizeof *places);
+  batten_status st = batten_tree_new(s->ctx, 3, count, places, out);
+  batten_free(s->ctx, places);
+  return st;
 }
 
-/* Several triangles around a tip may find it: the one stays that it lies above. */
-static void choose_tips(sharpener *w) {
+/* How far beside its triangle each centre lies; tips at places that are taken are given up. */
+static void measure_tips(sharpener *w, const batten_tree *taken) {
   const mesh_surface *s = w->s;
   for (size_t i = 0; i < w->centre_count; i++) {
     const uint32_t *v = w->sites[i].vertices;
@@ -301,20 +313,59 @@ static void choose_tips(sharpener *w) {
       d[k] = w->centres[i].x[k] - (point(s, v[0])[k] + point(s, v[1])[k] + point(s, v[2])[k]) / 3;
     double along = vec_dot(d, n);
     bool tip = w->sites[i].corners[0] == MESH_NONE;
-    if (tip && w->centres[i].found && is_taken(w, w->centres[i].x)) w->centres[i].found = false;
+    if (tip && w->centres[i].found && has_near(taken, w->centres[i].x, w->edge)) w->centres[i].found = false;
     w->sites[i].off = sqrt(fmax(0, vec_dot(d, d) - along * along));
   }
-  for (size_t i = 0; i < w->centre_count; i++)
-    for (size_t j = 0; j < i; j++) {
-      batten_crease *a = w->centres + i, *b = w->centres + j;
-      if (!a->found || !b->found || w->sites[i].corners[0] != MESH_NONE || w->sites[j].corners[0] != MESH_NONE ||
-          vec_distance(a->x, b->x) > 0.5 * w->edge)
-        continue;
-      if (w->sites[i].off < w->sites[j].off)
+}
+
+static int compare_indices(const void *a, const void *b) {
+  size_t x = *(const size_t *)a, y = *(const size_t *)b;
+  return (x > y) - (x < y);
+}
+
+/* Several triangles around a tip may find it: the one stays that it lies above. tips [count]: centres, of which
+ * places are the tree; near [count] is scratch. */
+static void thin_tips(sharpener *w, size_t count, const size_t *tips, const batten_tree *places, size_t *near) {
+  for (size_t i = 0; i < count; i++) {
+    batten_crease *a = w->centres + tips[i];
+    size_t found = batten_tree_within(places, a->x, 0.5 * w->edge, near);
+    qsort(near, found, sizeof *near, compare_indices);
+    for (size_t j = 0; j < found && near[j] < i; j++) {
+      batten_crease *b = w->centres + tips[near[j]];
+      if (!a->found || !b->found) continue;
+      if (w->sites[tips[i]].off < w->sites[tips[near[j]]].off)
         b->found = false;
       else
         a->found = false;
     }
+  }
+}
+
+static batten_status choose_tips(sharpener *w) {
+  batten_context *ctx = w->s->ctx;
+  size_t count = 0, *tips = NULL, *near = NULL;
+  double *places = NULL;
+  batten_tree *taken = NULL, *tree = NULL;
+  batten_status st = corner_places(w->s, &taken);
+  if (st < 0) return st;
+  measure_tips(w, taken);
+  batten_tree_free(ctx, taken);
+  if (!(tips = batten_alloc_array(ctx, w->centre_count, sizeof *tips)) ||
+      !(near = batten_alloc_array(ctx, w->centre_count, sizeof *near)) ||
+      !(places = batten_alloc_array(ctx, w->centre_count, 3 * sizeof *places)))
+    st = BATTEN_E_NOMEM;
+  for (size_t i = 0; st >= 0 && i < w->centre_count; i++) {
+    if (!w->centres[i].found || w->sites[i].corners[0] != MESH_NONE) continue;
+    memcpy(places + 3 * count, w->centres[i].x, 3 * sizeof *places);
+    tips[count++] = i;
+  }
+  if (st >= 0 && count > 1) st = batten_tree_new(ctx, 3, count, places, &tree);
+  if (tree) thin_tips(w, count, tips, tree, near);
+  batten_tree_free(ctx, tree);
+  batten_free(ctx, places);
+  batten_free(ctx, near);
+  batten_free(ctx, tips);
+  return st < 0 ? st : BATTEN_OK;
 }
 
 static batten_status find_centres(sharpener *w) {
@@ -335,8 +386,7 @@ static batten_status find_centres(sharpener *w) {
   for (size_t i = 0; i < w->centre_count; i++) /* tips; corners are where creases meet that are */
     if (w->sites[i].corners[0] == MESH_NONE && w->centres[i].rounds < BATTEN_CREASE_NARROW)
       w->centres[i].found = false;
-  if (st >= 0) choose_tips(w);
-  return st;
+  return st >= 0 ? choose_tips(w) : st;
 }
 
 /* ---- putting them into the mesh ----------------------------------------------------------------- */
@@ -484,10 +534,9 @@ static void tidy(mesh_surface *s, double edge, double angle) {
 }
 
 /* One pass over the compacted surface: *found is the number of places where creases were put into the mesh. */
-static batten_status insert(mesh_surface *s, batten_sampler *sampler, double edge, double angle, size_t avoid_count,
-                            const double *avoid, size_t *found) {
-  sharpener w = {
-      .s = s, .sampler = sampler, .edge = edge, .angle = angle, .avoid = avoid, .avoid_count = avoid_count};
+static batten_status insert(mesh_surface *s, batten_sampler *sampler, double edge, double angle,
+                            const batten_tree *avoid, size_t *found) {
+  sharpener w = {.s = s, .sampler = sampler, .edge = edge, .angle = angle, .avoid = avoid};
   *found = 0;
   batten_status st = take_normals(s, sampler);
   if (st >= 0) st = find_crossings(&w);
@@ -506,13 +555,12 @@ static batten_status insert(mesh_surface *s, batten_sampler *sampler, double edg
 }
 
 batten_status mesh_surface_sharpen(mesh_surface *s, batten_sampler *sampler, const double *lower, const double *upper,
-                                   double edge, double angle, size_t avoid_count, const double *avoid,
-                                   size_t *count) {
+                                   double edge, double angle, const batten_tree *avoid, size_t *count) {
   batten_status st = batten_progress(s->ctx, "sharpen", 0);
   *count = 0;
   for (int pass = 0; st >= 0 && pass < PASSES; pass++) {
     size_t found;
-    st = insert(s, sampler, edge, angle, avoid_count, avoid, &found);
+    st = insert(s, sampler, edge, angle, avoid, &found);
     if (st < 0 || found == 0) break;
     st = mesh_surface_improve_creased(s, sampler, lower, upper, edge, angle, pass == 0 ? ROUNDS_FIRST : ROUNDS_LATER);
     if (st >= 0) tidy(s, edge, angle);

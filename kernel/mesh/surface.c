@@ -14,6 +14,7 @@ void mesh_surface_free(mesh_surface *s) {
   batten_free(s->ctx, s->origin);
   batten_free(s->ctx, s->twin);
   batten_free(s->ctx, s->sharp);
+  batten_free(s->ctx, s->drift);
   *s = (mesh_surface){.ctx = s->ctx};
 }
 
@@ -73,18 +74,21 @@ batten_status mesh_surface_build(batten_context *ctx, batten_rough_surface *roug
   s.faces = rough->faces;
   s.origin = rough->triangles;
   *rough = (batten_rough_surface){0};
-  s.points_capacity = s.faces_capacity = s.normals_capacity = s.out_capacity = s.vertex_count;
+  s.points_capacity = s.faces_capacity = s.normals_capacity = s.out_capacity = s.drift_capacity = s.vertex_count;
   s.origin_capacity = s.twin_capacity = s.sharp_capacity = 3 * s.triangle_count;
   uint32_t *order = batten_alloc_array(ctx, 3 * s.triangle_count, sizeof *order);
   if (!order || !(s.normals = batten_alloc_array(ctx, s.vertex_count, 3 * sizeof *s.normals)) ||
       !(s.out = batten_alloc_array(ctx, s.vertex_count, sizeof *s.out)) ||
       !(s.twin = batten_alloc_array(ctx, 3 * s.triangle_count, sizeof *s.twin)) ||
-      !(s.sharp = batten_alloc_array(ctx, 3 * s.triangle_count, 1)))
+      !(s.sharp = batten_alloc_array(ctx, 3 * s.triangle_count, 1)) ||
+      !(s.drift = batten_alloc_array(ctx, s.vertex_count, sizeof *s.drift)))
     goto done;
+  for (size_t v = 0; v < s.vertex_count; v++) s.drift[v] = INFINITY;
   memset(s.sharp, 0, 3 * s.triangle_count);
   st = batten_mesh_sort_edges(ctx, s.vertex_count, s.triangle_count, s.origin, order);
-  if (st < 0) goto done;
-  st = pair_half_edges(&s, order);
+  if (st >= 0) st = batten_progress(ctx, "improve", 0);
+  if (st >= 0) st = pair_half_edges(&s, order);
+  if (st >= 0) st = batten_progress(ctx, "improve", 0);
   if (st < 0) goto done;
   set_normals(&s);
   *out = s;
@@ -105,14 +109,15 @@ batten_status mesh_surface_copy(const mesh_surface *s, mesh_surface *out) {
   batten_context *ctx = s->ctx;
   size_t v = s->vertex_count, h = 3 * s->triangle_count;
   mesh_surface copy = {.ctx = ctx, .vertex_count = v, .triangle_count = s->triangle_count};
-  copy.points_capacity = copy.normals_capacity = copy.faces_capacity = copy.out_capacity = v;
+  copy.points_capacity = copy.normals_capacity = copy.faces_capacity = copy.out_capacity = copy.drift_capacity = v;
   copy.origin_capacity = copy.twin_capacity = copy.sharp_capacity = h;
   if (!(copy.points = copy_array(ctx, s->points, v, 3 * sizeof *s->points)) ||
       !(copy.normals = copy_array(ctx, s->normals, v, 3 * sizeof *s->normals)) ||
       !(copy.faces = copy_array(ctx, s->faces, v, 1)) || !(copy.out = copy_array(ctx, s->out, v, sizeof *s->out)) ||
       !(copy.origin = copy_array(ctx, s->origin, h, sizeof *s->origin)) ||
       !(copy.twin = copy_array(ctx, s->twin, h, sizeof *s->twin)) ||
-      !(copy.sharp = copy_array(ctx, s->sharp, h, 1))) {
+      !(copy.sharp = copy_array(ctx, s->sharp, h, 1)) ||
+      !(copy.drift = copy_array(ctx, s->drift, v, sizeof *s->drift))) {
     mesh_surface_free(&copy);
     return BATTEN_E_NOMEM;
   }
@@ -176,13 +181,17 @@ static batten_status make_room(mesh_surface *s) {
   if (v >= UINT32_MAX || h >= UINT32_MAX)
     return batten_fail(ctx, BATTEN_E_TOO_LARGE, "opt.cell: %zu triangles are too many; enlarge it",
                        s->triangle_count);
+  if (v <= s->points_capacity && v <= s->normals_capacity && v <= s->faces_capacity && v <= s->out_capacity &&
+      v <= s->drift_capacity && h <= s->origin_capacity && h <= s->twin_capacity && h <= s->sharp_capacity)
+    return BATTEN_OK;
   if (batten_reserve(ctx, (void **)&s->points, &s->points_capacity, v, 3 * sizeof *s->points) < 0 ||
       batten_reserve(ctx, (void **)&s->normals, &s->normals_capacity, v, 3 * sizeof *s->normals) < 0 ||
       batten_reserve(ctx, (void **)&s->faces, &s->faces_capacity, v, 1) < 0 ||
       batten_reserve(ctx, (void **)&s->out, &s->out_capacity, v, sizeof *s->out) < 0 ||
       batten_reserve(ctx, (void **)&s->origin, &s->origin_capacity, h, sizeof *s->origin) < 0 ||
       batten_reserve(ctx, (void **)&s->twin, &s->twin_capacity, h, sizeof *s->twin) < 0 ||
-      batten_reserve(ctx, (void **)&s->sharp, &s->sharp_capacity, h, 1) < 0)
+      batten_reserve(ctx, (void **)&s->sharp, &s->sharp_capacity, h, 1) < 0 ||
+      batten_reserve(ctx, (void **)&s->drift, &s->drift_capacity, v, sizeof *s->drift) < 0)
     return BATTEN_E_NOMEM;
   return BATTEN_OK;
 }
@@ -211,6 +220,8 @@ uint32_t mesh_surface_split(mesh_surface *s, uint32_t h, const double *x) {
   double *n = s->normals + 3 * (size_t)m;
   for (size_t k = 0; k < 3; k++) n[k] = s->normals[3 * (size_t)a + k] + s->normals[3 * (size_t)b + k];
   vec_normalize(n);
+  double half = 0.5 * vec_distance(s->points + 3 * (size_t)a, s->points + 3 * (size_t)b);
+  s->drift[m] = (float)(fmax(s->drift[a], s->drift[b]) + half);
   s->faces[m] = g == MESH_NONE ? s->faces[a] & s->faces[b] & (unsigned char)~MESH_MARKS : 0;
   if (s->sharp[h]) s->faces[m] |= MESH_CREASE;
   uint32_t mb = split_half(s, h, m);
@@ -235,6 +246,7 @@ uint32_t mesh_surface_poke(mesh_surface *s, uint32_t t, const double *x) {
   }
   vec_normalize(normal);
   s->faces[m] = 0;
+  s->drift[m] = INFINITY;
   for (uint32_t i = 1; i < 3; i++) { /* its sides 1 and 2 get a triangle each, with the sides: old, to m, from m */
     uint32_t side = n + 3 * (i - 1), old = h + i;
     s->origin[side] = s->origin[old];
@@ -356,7 +368,14 @@ void mesh_surface_flip(mesh_surface *s, uint32_t h) {
 
 /* ---- compaction --------------------------------------------------------------------------------- */
 
+static bool is_compact(const mesh_surface *s) {
+  for (size_t v = 0; v < s->vertex_count; v++)
+    if (s->out[v] == MESH_NONE) return false;
+  return true; /* every collapse takes a vertex */
+}
+
 batten_status mesh_surface_compact(mesh_surface *s) {
+  if (is_compact(s)) return BATTEN_OK;
   uint32_t vertices = 0, triangles = 0;
   uint32_t *number = batten_alloc_array(s->ctx, s->vertex_count + s->triangle_count, sizeof *number);
   if (!number) return BATTEN_E_NOMEM;
@@ -366,6 +385,7 @@ batten_status mesh_surface_compact(mesh_surface *s) {
     memmove(s->points + 3 * (size_t)vertices, s->points + 3 * v, 3 * sizeof *s->points);
     memmove(s->normals + 3 * (size_t)vertices, s->normals + 3 * v, 3 * sizeof *s->normals);
     s->faces[vertices] = s->faces[v];
+    s->drift[vertices] = s->drift[v];
     s->out[vertices] = s->out[v];
     vertex_number[v] = vertices++;
   }

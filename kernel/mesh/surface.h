@@ -25,8 +25,9 @@ typedef struct mesh_surface {
   uint32_t *out;            /* [V] */
   uint32_t *origin, *twin;  /* [3 T] */
   unsigned char *sharp;     /* [3 T] */
+  float *drift;             /* [V] the way along the surface since f was last known there; INFINITY: it never was */
   size_t points_capacity, normals_capacity, faces_capacity, out_capacity, origin_capacity, twin_capacity;
-  size_t sharp_capacity;
+  size_t sharp_capacity, drift_capacity;
 } mesh_surface;
 
 /* Takes over the arrays of rough, which is emptied. INTERNAL when it is no oriented manifold. */

@@ -35,13 +35,19 @@ static inline void vec_triangle_normal(const double *a, const double *b, const d
 
 /* Scales a to length 1 whatever its size; false and zero when it has no direction. */
 static inline int vec_normalize(double *a) {
-  double largest = fmax(fabs(a[0]), fmax(fabs(a[1]), fabs(a[2])));
-  if (!(largest > 0) || isinf(largest)) {
-    a[0] = a[1] = a[2] = 0;
-    return 0;
+  double square = vec_dot(a, a);
+  if (!(square > 1e-280 && square < 1e280)) { /* by a power of two, which changes no digit of the outcome */
+    double largest = fmax(fabs(a[0]), fmax(fabs(a[1]), fabs(a[2])));
+    if (!(largest > 0) || isinf(largest)) {
+      a[0] = a[1] = a[2] = 0;
+      return 0;
+    }
+    int exponent;
+    frexp(largest, &exponent);
+    for (int k = 0; k < 3; k++) a[k] = ldexp(a[k], -exponent);
+    square = vec_dot(a, a);
   }
-  for (int k = 0; k < 3; k++) a[k] /= largest;
-  double length = vec_norm(a);
+  double length = sqrt(square);
   for (int k = 0; k < 3; k++) a[k] /= length;
   return 1;
 }

@@ -62,13 +62,15 @@ typedef struct batten_mesh_measures {
   double edge_min, edge_mean, edge_max;
 } batten_mesh_measures;
 /* Lengths, angles and the box are 0 for a mesh without triangles. Figures keep their digits far from the origin, and
- * in any unit that does not overflow itself. Time O(V + F). Fails: INVALID, NOMEM. */
+ * in any unit that does not overflow itself. Time O(V + F), the figures on the context's threads. Progress phase
+ * "measure". Fails: INVALID, NOMEM, CANCELLED. */
 BATTEN_API batten_status batten_mesh_measure(batten_context *ctx, const batten_mesh *mesh, batten_mesh_measures *out);
 
 /* Pairs of triangles that have more in common than the corners that they share: crossing, touching, folded onto each
  * other, or given twice. Corners are shared when they lie at the same place, whatever their indices; triangles
  * without area take no part. Exact: by signs of determinants in expansion arithmetic. Time O(F log F) for even
- * meshes; on the context's threads. Fails: INVALID, NOMEM. */
+ * meshes; on the context's threads. Memory: about 75 bytes a triangle. Progress phase "crossings". Fails: INVALID,
+ * NOMEM, CANCELLED. */
 BATTEN_API batten_status batten_mesh_self_intersections(batten_context *ctx, const batten_mesh *mesh, size_t *pairs);
 
 /* ---- defects and repair -------------------------------------------------------------------------- */
@@ -148,8 +150,9 @@ typedef struct batten_polygonize_options {
                                 differences of 1e-4 cell */
   double accuracy;  /* |f| / |grad f| over the clip box's diagonal at every vertex, in (0, 1); smaller costs at most
                        an evaluation more. Default 1e-6. */
-  unsigned improve; /* rounds of mesh improvement, each half an evaluation per vertex. 0 leaves the slivers of the
-                       lattice, 4 make nearly all angles > 20 degrees. Default 8. */
+  unsigned improve; /* rounds of mesh improvement, of which the first asks the field at every vertex and the others
+                       where moves along the surface may have led off it. 0 leaves the slivers of the lattice, 4 make
+                       nearly all angles > 20 degrees. Default 8. */
   size_t evaluations_max; /* give up above so many field evaluations, 0 = none. Default 0. */
   double sharp_deg; /* mesh edges follow creases of f = 0, where normals turn by more than so many degrees, 15 .. 170,
                        at a kink of f or within a sixteenth of the cell (a quarter, along such a crease); vertices go
@@ -180,7 +183,12 @@ typedef struct batten_polygonize_info {
  *   field   three-dimensional; order 0 costs six evaluations for a gradient
  *   seeds   NULL with seed_count 0, opt.lower and opt.upper given, and a field with bounds: the whole surface in the
  *           box is found (batten_find_seeds with the cell; 0 = 1/60 of the box's diagonal)
- *   Progress phases: "search" (without seeds), "surface", "improve", "settle", "sharpen".
+ *   Progress phases: "search" (without seeds), "surface", "improve", "settle", "crossings", "sharpen".
+ *   Cost of a smooth surface, by default: 5 to 7 evaluations of the field for each vertex of the result, in few large
+ *   batches, and some 10 us of processor time for each triangle, in proportion to their number; seeds all over the
+ *   surface make the first batch nearly all of the lattice. Memory: below 1 KB for each vertex of the result at the
+ *   peak (the lattice makes four times as many triangles as stay), beside what the field takes for a batch of two to
+ *   three points for each vertex.
  * Positive status: BATTEN_W_ACCURACY (accuracy is missed, or the mesh crosses itself), BATTEN_W_CLIPPED.
  * Fails: INVALID (also: the field is not finite somewhere, the text names the point), NOMEM, TOO_LARGE (cells,
  * indices, evaluations_max), NOT_FOUND (f changes its sign near no seed), CANCELLED, and as the field fails. info may
