@@ -150,8 +150,8 @@ void solid_summary(const solid_work *w) {
   cli_line("solid", "carrier %s, solver %s, residual %.1e%s", carrier_name(w),
            batten_saddle_method_name(i->spline.saddle.method), i->residual_max, loo);
   if (w->request->fit.reduce > 0)
-    cli_line("centres", "%zu of the points, the surface within %.3g of %s", i->reduced.centers,
-             i->reduced.error_certified, i->reduced.certified_points == i->points_used ? "all" : "all, by fast sums");
+    cli_line("centres", "%zu of %zu, the surface within %.3g of all points%s", i->reduced.centers, i->reduced.points,
+             i->reduced.error_certified, i->reduced.certified_points == i->reduced.points ? "" : ", by fast sums");
   cli_line("sign", "%s%s%s", sign_name(i->sign), i->orientation == BATTEN_ORIENTATION_NONE ? "" : ", orientation ",
            i->orientation == BATTEN_ORIENTATION_NONE ? "" : orientation_name(i->orientation));
   body_print(&w->body);

@@ -32,7 +32,7 @@ static batten_status check_tolerances(batten_context *ctx, size_t count, const b
   return BATTEN_OK;
 }
 
-static batten_status check_reduce(batten_context *ctx, const batten_spline_data *d,
+static batten_status check_reduce(batten_context *ctx, const batten_spline_data *d, const batten_spline_options *opt,
                                   const batten_spline_reduce_options *o) {
   batten_status st = batten_check_struct(ctx, "batten_spline_reduce_options", o->struct_size, sizeof *o);
   if (st < 0) return st;
@@ -46,6 +46,11 @@ static batten_status check_reduce(batten_context *ctx, const batten_spline_data 
     return batten_fail(ctx, BATTEN_E_INVALID, "reduce.share_max: %g; must be in (0, 1]", o->share_max);
   if (!(o->terms_max >= 0))
     return batten_fail(ctx, BATTEN_E_INVALID, "reduce.terms_max: %g; must be >= 0", o->terms_max);
+  const size_t least = batten_polynomial_count(d->n, opt->m - 1) + 2 * d->n; /* they span the box too */
+  if (o->centers_max && o->centers_max < least)
+    return batten_fail(ctx, BATTEN_E_INVALID,
+                       "reduce.centers_max: %zu; with n = %u and m = %u give 0 or at least %zu", o->centers_max, d->n,
+                       opt->m, least);
   if (o->distance_count > d->count)
     return batten_fail(ctx, BATTEN_E_INVALID, "reduce.distance_count: %zu, more than data.count = %zu points",
                        o->distance_count, d->count);
@@ -65,7 +70,7 @@ static batten_status check_arguments(batten_context *ctx, const batten_spline_da
   if (!data || !reduce || !out)
     return batten_fail(ctx, BATTEN_E_INVALID, "%s: NULL", !data ? "data" : reduce ? "out" : "reduce");
   batten_status st = batten_spline_check_data(ctx, data, opt);
-  return st < 0 ? st : check_reduce(ctx, data, reduce);
+  return st < 0 ? st : check_reduce(ctx, data, opt, reduce);
 }
 
 /* ---- memory ---- */
@@ -158,8 +163,7 @@ static batten_status fit_round(reduction *r, batten_spline_options o) {
   info->time_fit_s += batten_now() - start;
   if (st >= 0) st = batten_reduce_measure(r);
   if (st < 0) return st;
-  for (size_t i = 0; i < r->data->count; i++)
-    if (!(r->ratio[i] <= worst)) worst = r->ratio[i];
+  for (size_t i = 0; i < r->data->count; i++) worst = fmax(worst, r->ratio[i]);
   if (info->rounds < BATTEN_SPLINE_REDUCE_ROUNDS)
     info->history[info->rounds] = (batten_spline_reduce_round){r->centres, worst};
   info->rounds++;
@@ -179,15 +183,23 @@ static batten_status take_all(reduction *r) {
   return fit_round(r, o);
 }
 
+static size_t centres_allowed(const reduction *r) {
+  const size_t asked = r->reduce.centers_max;
+  return asked && asked < r->distinct ? asked : r->distinct;
+}
+
 /* A start whose points lie on the zero set of a polynomial has no spline: twice as many may, in the end all. */
 static batten_status first_round(reduction *r) {
+  const size_t allowed = centres_allowed(r);
   for (size_t wanted = START;; wanted *= 2) {
     double start = batten_now();
-    batten_status st = batten_reduce_start(r, wanted);
+    batten_status st = batten_reduce_start(r, wanted, allowed);
     r->info.time_select_s += batten_now() - start;
     if (st >= 0) st = fit_round(r, options_of_round(r));
     if (st != BATTEN_E_SINGULAR) return st;
-    if (2 * r->centres > r->distinct) return take_all(r);
+    const bool last = wanted >= r->data->count;
+    if (allowed < r->distinct && (last || r->centres >= allowed)) return st;
+    if (allowed == r->distinct && (last || 2 * r->centres > r->distinct)) return take_all(r);
   }
 }
 
@@ -199,11 +211,6 @@ static batten_status tell_progress(const reduction *r) {
   if (last > 0 && h[0].ratio_max > 1 && isfinite(h[0].ratio_max))
     fraction = 1 - log(fmax(h[last - 1].ratio_max, 1)) / log(h[0].ratio_max);
   return batten_progress(r->ctx, "reduce", fmin(fmax(fraction, 0), 1));
-}
-
-static size_t centres_allowed(const reduction *r) {
-  const size_t asked = r->reduce.centers_max;
-  return asked && asked < r->distinct ? asked : r->distinct;
 }
 
 /* Adds centres and fits again until no free point asks for it, or no more are allowed. */
@@ -276,7 +283,9 @@ batten_status batten_spline_fit_reduced(batten_context *ctx, const batten_spline
   r.allowed = batten_reduce_allowed_at_first(&r);
   if ((st = find_centres(&r)) < 0) goto done;
   st = judge(&r);
+  r.info.points = data->count;
   r.info.centers = r.centres;
+  r.info.all = r.centres == r.distinct;
   r.info.time_total_s = batten_now() - start;
   if (info) *info = r.info;
   *out = r.spline;

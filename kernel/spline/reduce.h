@@ -43,8 +43,9 @@ typedef struct reduction {
 
 /* Marks twins, makes the tree. */
 batten_status batten_reduce_prepare(reduction *r);
-/* About `wanted` well-spread points and those that span the box become centres, in addition to those there are. */
-batten_status batten_reduce_start(reduction *r, size_t wanted);
+/* About `wanted` well-spread points and those that span the box become centres, in addition to those there are; up to
+ * `most` of all. */
+batten_status batten_reduce_start(reduction *r, size_t wanted, size_t most);
 /* Of the free points with ratio > 1 the worst become centres, at most `most`. Returns how many. */
 size_t batten_reduce_add_worst(reduction *r, size_t most);
 /* A heap of point indices by ratio, the largest on top; of equal ones the lowest index. */

@@ -1,6 +1,6 @@
 /* Errors at all points. Rounds may take fast sums; the final check takes batten_spline_evaluate(), which shares
  * nothing with them nor with the fit, and where that is too much at all points, at the worst and at evenly drawn
- * ones: what the fast sums were off there is then added to the others. */
+ * ones: at the others the fast sums are then taken to be off by as much as at the worst of these. */
 #include "spline/reduce.h"
 
 #include <float.h>
@@ -21,10 +21,13 @@ static const size_t WORST_PART = 10, CERTIFIED_LEAST = 1000;
 
 /* ---- from values to errors ---- */
 
+/* Over the largest entry, since squares of values in small or large units leave the range of doubles. */
 static double length(size_t n, const double *v) {
-  double square = 0;
-  for (size_t a = 0; a < n; a++) square += v[a] * v[a];
-  return sqrt(square);
+  double largest = 0, square = 0;
+  for (size_t a = 0; a < n; a++) largest = fmax(largest, fabs(v[a]));
+  if (!(largest > 0) || isinf(largest)) return largest;
+  for (size_t a = 0; a < n; a++) square += (v[a] / largest) * (v[a] / largest);
+  return largest * sqrt(square);
 }
 
 /* |grad f| at point i < D, gradient: grad U. */
@@ -35,12 +38,18 @@ static double slope(const reduction *r, size_t i, const double *gradient) {
   return length(n, v);
 }
 
-/* Of point i from U and grad U there. A distance without a slope is infinite. */
+/* Of point i when |U - v| is miss and |grad f| is slope (not read but for distances). A distance without a slope is
+ * infinite, and so is what is no number: nothing is missed by more. */
+static double error_of(const reduction *r, size_t i, double miss, double steep) {
+  if (i < r->reduce.distance_count && miss != 0) miss = steep > 0 && !isinf(steep) ? miss / steep : INFINITY;
+  return isnan(miss) ? INFINITY : miss;
+}
+
+/* From U and grad U at point i. */
 static void set_error(reduction *r, size_t i, double value, const double *gradient) {
-  double error = fabs(value - r->data->values[i]);
-  if (i < r->reduce.distance_count && error > 0) error /= slope(r, i, gradient);
-  r->error[i] = error;
-  r->ratio[i] = error / batten_reduce_tolerance(r, i);
+  const double steep = i < r->reduce.distance_count ? slope(r, i, gradient) : 1;
+  r->error[i] = error_of(r, i, fabs(value - r->data->values[i]), steep);
+  r->ratio[i] = r->error[i] / batten_reduce_tolerance(r, i);
 }
 
 static void set_errors(reduction *r) {
@@ -122,6 +131,11 @@ batten_status batten_reduce_measure(reduction *r) {
 
 /* ---- the final check ---- */
 
+/* What fast sums are off, at the most. */
+typedef struct sums_off {
+  double value, gradient;
+} sums_off;
+
 /* The worst points and evenly drawn ones: list [count], increasing in nothing. Returns how many. */
 static size_t points_to_certify(reduction *r, size_t *list) {
   const size_t count = r->data->count;
@@ -145,9 +159,8 @@ static size_t points_to_certify(reduction *r, size_t *list) {
   return made;
 }
 
-/* Errors at the points of list by direct sums; *margin: what they differ by from those before, over the tolerance.
- */
-static batten_status certify_some(reduction *r, size_t count, const size_t *list, double *margin, double *off) {
+/* Errors at the points of list by direct sums; *off: what fast sums are off there, values and gradients. */
+static batten_status certify_some(reduction *r, size_t count, const size_t *list, sums_off *off) {
   const size_t n = r->data->n;
   double *x = batten_alloc_array(r->ctx, count, (2 * n + 1) * sizeof *x);
   if (!x) return BATTEN_E_NOMEM;
@@ -155,32 +168,39 @@ static batten_status certify_some(reduction *r, size_t count, const size_t *list
   for (size_t q = 0; q < count; q++) memcpy(x + q * n, r->data->points + list[q] * n, n * sizeof *x);
   batten_status st =
       batten_spline_evaluate(r->ctx, r->spline, count, x, u, r->reduce.distance_count ? g : NULL, NULL);
-  *margin = *off = 0;
   for (size_t q = 0; st >= 0 && q < count; q++) {
     const size_t i = list[q];
-    const double error = r->error[i], ratio = r->ratio[i];
+    double d[3] = {0};
+    off->value = fmax(off->value, fabs(u[q] - r->values[i]));
+    for (size_t a = 0; a < n && i < r->reduce.distance_count; a++) d[a] = g[q * n + a] - r->gradients[i * n + a];
+    off->gradient = fmax(off->gradient, length(n, d));
     set_error(r, i, u[q], g + q * n);
-    *off = fmax(*off, fabs(r->error[i] - error));
-    *margin = fmax(*margin, fabs(r->ratio[i] - ratio));
   }
   batten_free(r->ctx, x);
   return st;
 }
 
+/* The error of point i, whose sums are fast ones, when they are off by as much as at any point that was summed
+ * directly. In values and gradients, not in distances over tolerances: these have to do with the point alone. */
+static double bound_of(const reduction *r, size_t i, const sums_off *off) {
+  const bool distance = i < r->reduce.distance_count;
+  const double steep = distance ? slope(r, i, r->gradients + i * r->data->n) - off->gradient : 1;
+  return error_of(r, i, fabs(r->values[i] - r->data->values[i]) + off->value, steep);
+}
+
 /* The bounds from the errors; certified: marks of the points that were summed directly, NULL: all. */
-static void tell(reduction *r, const unsigned char *certified, double margin, double off) {
+static void tell(reduction *r, const unsigned char *certified, const sums_off *off) {
   const size_t count = r->data->count, told = r->reduce.distance_count ? r->reduce.distance_count : count;
   batten_spline_reduce_info *i = &r->info;
   double sum = 0;
   i->error_max = i->error_certified = i->ratio_max = 0;
   for (size_t q = 0; q < count; q++) {
     const bool direct = !certified || certified[q];
-    const double ratio = r->ratio[q] + (direct ? 0 : margin);
-    if (!(ratio <= i->ratio_max)) i->ratio_max = ratio;
+    const double error = direct ? r->error[q] : bound_of(r, q, off);
+    i->ratio_max = fmax(i->ratio_max, direct ? r->ratio[q] : error / batten_reduce_tolerance(r, q));
     if (q >= told) continue;
-    const double error = r->error[q] + (direct ? 0 : off);
-    if (!(r->error[q] <= i->error_max)) i->error_max = r->error[q];
-    if (!(error <= i->error_certified)) i->error_certified = error;
+    i->error_max = fmax(i->error_max, r->error[q]);
+    i->error_certified = fmax(i->error_certified, error);
     sum += r->error[q] * r->error[q];
   }
   i->error_rms = sqrt(sum / (double)told);
@@ -190,7 +210,7 @@ batten_status batten_reduce_certify(reduction *r) {
   const double start = batten_now();
   const size_t count = r->data->count;
   unsigned char *marks = NULL;
-  double margin = 0, off = 0;
+  sums_off off = {0};
   batten_status st = BATTEN_OK;
   r->info.certified_points = count;
   if (!r->direct && terms(r) <= r->reduce.terms_max) {
@@ -202,10 +222,10 @@ batten_status batten_reduce_certify(reduction *r) {
     if (!marks) return BATTEN_E_NOMEM;
     memset(marks, 0, count);
     for (size_t q = 0; q < some; q++) marks[r->near[q]] = 1;
-    st = certify_some(r, some, r->near, &margin, &off);
+    st = certify_some(r, some, r->near, &off);
     r->info.certified_points = some;
   }
-  if (st >= 0) tell(r, marks, margin, off);
+  if (st >= 0) tell(r, marks, &off);
   batten_free(r->ctx, marks);
   r->info.time_certify_s += batten_now() - start;
   return st;

@@ -122,13 +122,21 @@ done:
   return st;
 }
 
-batten_status batten_reduce_start(reduction *r, size_t wanted) {
+static size_t reversed(size_t number, unsigned bits) {
+  size_t back = 0;
+  for (unsigned bit = 0; bit < bits; bit++) back |= (number >> bit & 1) << (bits - 1 - bit);
+  return back;
+}
+
+batten_status batten_reduce_start(reduction *r, size_t wanted, size_t most) {
   const size_t count = r->data->count;
   unsigned halvings = 0;
-  while (((size_t)1 << halvings) < wanted && ((size_t)2 << halvings) <= count) halvings++;
+  while (((size_t)1 << halvings) < wanted && ((size_t)2 << halvings) <= count && ((size_t)1 << halvings) < most)
+    halvings++;
   add_extremes(r);
   batten_tree_order(r->tree, r->heap);
-  for (size_t cell = 0; cell < (size_t)1 << halvings; cell++) {
+  for (size_t turn = 0; turn < (size_t)1 << halvings && r->centres < most; turn++) {
+    const size_t cell = reversed(turn, halvings); /* well spread wherever it stops */
     size_t low = 0, high = count;
     for (unsigned bit = halvings; bit-- > 0;) {
       const size_t middle = low + (high - low) / 2;

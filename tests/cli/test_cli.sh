@@ -187,6 +187,9 @@ holds u.json reduce_ratio 'x <= 1'
 holds u.json points_certified "x == $(figure u.json points_used)"
 holds u.json centers "x < 0.7 * $(figure u.json points_used)"
 run 2 "--reduce" solid s.csv --reduce -1
+run 0 "" solid s.csv --orientation estimate --reduce 0.05 --cell 0.4
+grep -q "^centres .* of all points$" out
+ok $? "pairs are summed directly too, and it says so: $(grep ^centres out)"
 run 0 "warning: the surface reaches its box and is cut there; enlarge --box" solid s.csv --report u.json --quiet --box 1,-8,-2,6,-2,1.5
 is u.json status clipped
 is u.json mesh_closed False

@@ -210,7 +210,81 @@ static void test_many_terms(batten_context *ctx) {
   free_cloud(&c);
 }
 
+/* The same in space, for values, distances, and both with tolerances of their own, against the test's own sums. */
+static void test_many_terms_in_space(batten_context *ctx) {
+  cloud c = make_sphere(3000, 7);
+  double *tolerances = malloc(c.count * sizeof *tolerances);
+  for (size_t i = 0; i < c.count; i++) tolerances[i] = i % 50 ? 5e-3 : 5e-4;
+  for (int k = 0; k < 3; k++) {
+    batten_spline_reduce_options r = to(5e-3);
+    batten_spline_reduce_info i = {0};
+    double error;
+    r.terms_max = 0;
+    r.distance_count = k == 0 ? 0 : k == 1 ? c.count : 2000;
+    r.field_gradients = c.gradients;
+    if (k == 2) r.tolerances = tolerances;
+    batten_spline *s = reduce(ctx, &c, NULL, &r, BATTEN_OK, &i);
+    const double ratio = recompute(&c, s, &r, &error);
+    T_RATIO(ratio, 1, "%zu distances: %zu centres", r.distance_count, i.centers);
+    T_RATIO(ratio, i.ratio_max * (1 + 1e-9), "largest error over its tolerance, against the bound");
+    T_RATIO(error, i.error_certified * (1 + 1e-9), "largest error");
+    T_RATIO(i.ratio_max, 1.05 * ratio, "the bound is tight");
+    T_CHECK(i.points == c.count && i.certified_points == 1000, "%zu points certified", i.certified_points);
+    batten_spline_free(s);
+  }
+  free(tolerances);
+  free_cloud(&c);
+}
+
 /* ---- special cases ---- */
+
+/* No more than that, from the first round on. */
+static void test_few_allowed(batten_context *ctx) {
+  cloud c = make_sphere(2000, 11);
+  static const size_t most[] = {10, 20, 133, 300};
+  for (size_t k = 0; k < sizeof most / sizeof *most; k++) {
+    batten_spline_reduce_options r = to(1e-3);
+    batten_spline_reduce_info i = {0};
+    r.centers_max = most[k];
+    batten_spline *s = reduce(ctx, &c, NULL, &r, BATTEN_W_ACCURACY, &i);
+    T_CHECK(parts_of(s).count == most[k] && i.centers == most[k] && !i.all, "%zu allowed: %zu", most[k], i.centers);
+    T_CHECK(strstr(batten_error(ctx), "allow more by reduce.centers_max"), "%s", batten_error(ctx));
+    batten_spline_free(s);
+  }
+  c.count = 4;
+  batten_spline_reduce_options r = to(1e-3);
+  batten_spline_reduce_info i = {0};
+  batten_spline_free(reduce(ctx, &c, NULL, &r, BATTEN_OK, &i));
+  T_CHECK(i.all && i.centers == 4, "four points: all of them, and so it says");
+  free_cloud(&c);
+}
+
+/* All points but few lie in a plane, and so does every start of that many. */
+static void test_flat_few_allowed(batten_context *ctx) {
+  cloud c = make_box(3, 512);
+  for (size_t i = 0; i < c.count; i++) c.points[3 * i + 2] = 0.5 * c.points[3 * i];
+  batten_spline_reduce_options r = to(1e-3);
+  batten_spline_reduce_info i = {0};
+  r.centers_max = 300;
+  T_CHECK(!reduce(ctx, &c, NULL, &r, BATTEN_E_SINGULAR, &i), "in a plane, 300 allowed: %s", batten_error(ctx));
+  free_cloud(&c);
+}
+
+/* Squares of slopes in such units are no doubles any more, distances are the same. */
+static void test_small_values(batten_context *ctx) {
+  cloud c = make_sphere(2000, 12);
+  batten_spline_reduce_options r = to(5e-3);
+  batten_spline_reduce_info i = {0}, j = {0};
+  r.distance_count = c.count;
+  r.field_gradients = c.gradients;
+  batten_spline_free(reduce(ctx, &c, NULL, &r, BATTEN_OK, &i));
+  for (size_t k = 0; k < c.count; k++) c.values[k] = ldexp(c.values[k], -600);
+  for (size_t k = 0; k < 3 * c.count; k++) c.gradients[k] = ldexp(c.gradients[k], -600);
+  batten_spline_free(reduce(ctx, &c, NULL, &r, BATTEN_OK, &j));
+  T_CHECK(i.centers == j.centers && i.error_max == j.error_max,
+          "values times 2^-600: the same distances, %zu centres", j.centers);
+  free_cloud(&c);
+}
 
 static void test_all(batten_context *ctx) {
   cloud c = make_box(3, 300);
@@ -438,6 +512,8 @@ static void test_bad(batten_context *ctx) {
   BAD("reduce.share_max: 1.5");
   r = good, r.terms_max = NAN;
   BAD("reduce.terms_max: nan");
+  r = good, r.centers_max = 9;
+  BAD("reduce.centers_max: 9; with n = 3 and m = 2 give 0 or at least 10");
   r = good, r.distance_count = 201;
   BAD("reduce.distance_count: 201, more than data.count = 200");
   r = good, r.distance_count = 3;
@@ -461,6 +537,10 @@ int main(void) {
   batten_context *ctx = t_context(NULL, NULL, 2);
   test_promise(ctx);
   test_many_terms(ctx);
+  test_many_terms_in_space(ctx);
+  test_few_allowed(ctx);
+  test_flat_few_allowed(ctx);
+  test_small_values(ctx);
   test_all(ctx);
   test_polynomial(ctx);
   test_kernels(ctx);

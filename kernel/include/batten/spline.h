@@ -85,7 +85,8 @@ typedef struct batten_spline_reduce_options {
   size_t distance_count;    /* D <= N: where U stands for a field F with F(x_i) = v_i, the tolerances of the first D
                                points are distances: |f| / |grad f| <= tolerance, f = F - U. Default 0. */
   const double *field_gradients; /* [D][n] grad F(x_i) */
-  size_t centers_max;       /* stops there and tells what was reached; 0 = no limit. Default 0. */
+  size_t centers_max;       /* stops there and tells what was reached; 0 = no limit, else at least 2 n and as many as
+                               the polynomial has monomials more. Default 0. */
   double share_max;         /* in (0, 1]: where more than this share of the points is wanted, all are taken.
                                Default 0.5. */
   double terms_max;         /* the final check sums directly at all points up to so many terms (N + D) C; above
@@ -103,14 +104,16 @@ typedef struct batten_spline_reduce_round {
 
 /* Errors are |U(x_i) - v_i|; with distance_count, distances at those points alone. */
 typedef struct batten_spline_reduce_info {
+  size_t points;             /* N */
   size_t centers;            /* C */
   int all;                   /* non-zero: every point (of equal ones the first) has become a centre */
   unsigned rounds;           /* fits */
-  batten_spline_reduce_round history[BATTEN_SPLINE_REDUCE_ROUNDS];
+  batten_spline_reduce_round history[BATTEN_SPLINE_REDUCE_ROUNDS]; /* of the first rounds */
   size_t certified_points;   /* points whose error was summed directly in the end */
   double error_max, error_rms; /* at all points: direct where certified, else by fast sums */
-  double error_certified;    /* bound of the error at all points: error_max, or, where not all were summed directly,
-                                at the others that of fast sums and the largest that they were off at the certified */
+  double error_certified;    /* error_max, all of it by direct sums, when certified_points = N. Else also a bound at
+                                the others, if fast sums (values, gradients) are off there by no more than at the
+                                worst of the certified */
   double ratio_max;          /* error_certified's counterpart over the tolerances: met when <= 1 */
   double time_select_s, time_fit_s, time_evaluate_s, time_certify_s, time_total_s;
   batten_spline_info fit;    /* of the last fit, to its centres; without leave-one-out errors */
