@@ -187,11 +187,15 @@ void batten_fmm_translate(const fmm_far *f, double factor, const double *level, 
   }
 }
 
-double *batten_fmm_level_transfer(batten_context *ctx, const fmm_operators *o, double half) {
-  const size_t size = o->stride * o->rank;
+size_t batten_fmm_level_transfer_bytes(const fmm_operators *o) {
   size_t kinds = 0;
   for (unsigned k = 0; k < FMM_KINDS; k++) kinds += o->transfer[k] != NULL;
-  double *made = batten_alloc_array(ctx, kinds, size * sizeof *made), *out = made;
+  return kinds * o->stride * o->rank * sizeof(double);
+}
+
+double *batten_fmm_level_transfer(batten_context *ctx, const fmm_operators *o, double half) {
+  const size_t size = o->stride * o->rank;
+  double *made = batten_alloc(ctx, batten_fmm_level_transfer_bytes(o)), *out = made;
   if (!made) return NULL;
   const double l = log(half);
   for (unsigned k = 0; k < FMM_KINDS; k++) {

@@ -23,6 +23,9 @@ static batten_status check_options(batten_context *ctx, const batten_radial *ker
   if (!(opt->accuracy >= 1e-12 && opt->accuracy <= 1e-3))
     return batten_fail(ctx, BATTEN_E_INVALID, "opt.accuracy: %g; must be 1e-12 .. 1e-3", opt->accuracy);
   const batten_fmm *share = opt->share;
+  if (share && share->ctx != ctx) /* whose memory its operators are */
+    return batten_fail(ctx, BATTEN_E_INVALID,
+                       "opt.share: a plan of another context; share plans of the context that is passed");
   if (share && (share->kernel.n != kernel->n || share->kernel.power != kernel->power))
     return batten_fail(
         ctx, BATTEN_E_INVALID,

@@ -166,7 +166,10 @@ batten_fmm_evaluator_info batten_fmm_evaluator_get_info(const batten_fmm_evaluat
   const fmm_nodes *t = &e->nodes;
   i.nodes = t->count;
   i.bytes += t->room * sizeof *t->node + t->near_room * sizeof *t->near + t->slab_room * sizeof *t->slab;
-  if (e->operators) i.bytes += t->slabs * FMM_SLAB_NODES * e->operators->full * sizeof(double);
+  if (!e->operators) return i;
+  i.bytes += t->slabs * FMM_SLAB_NODES * e->operators->full * sizeof(double);
+  for (unsigned level = 0; level < FMM_LEVELS_MAX; level++)
+    if (e->level_transfer[level]) i.bytes += batten_fmm_level_transfer_bytes(e->operators);
   return i;
 }
 
@@ -176,7 +179,9 @@ static double *make_results(batten_context *ctx, batten_fmm_evaluator *e, size_t
   if (results || !e->nodes.count) return results;
   batten_fmm_nodes_drop(e);
   e->info.drops++;
-  return batten_alloc_array(ctx, count, each * sizeof *results);
+  results = batten_alloc_array(ctx, count, each * sizeof *results);
+  if (results) batten_expect(ctx, BATTEN_E_NOMEM, BATTEN_E_NOMEM); /* nothing is left to be told */
+  return results;
 }
 
 batten_status batten_fmm_evaluator_evaluate(batten_context *ctx, batten_fmm_evaluator *e, size_t count,

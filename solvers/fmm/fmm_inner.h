@@ -198,6 +198,7 @@ void batten_fmm_translate(const fmm_far *f, double factor, const double *level, 
 /* Kernels with a logarithm: C_t + ln h D_t for all kinds that there are, [kinds][stride * rank]; NULL without
  * memory. */
 double *batten_fmm_level_transfer(batten_context *ctx, const fmm_operators *o, double half);
+size_t batten_fmm_level_transfer_bytes(const fmm_operators *o);
 /* tensor += U inner */
 void batten_fmm_expand(const fmm_far *f, const double *inner, double *tensor, double *spare);
 /* tensor += terms first .. last - 1, that are apart from the cell, by their sums at its nodes */

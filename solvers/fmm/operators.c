@@ -33,9 +33,8 @@
 fmm_orders batten_fmm_orders(const batten_radial *kernel, double accuracy, bool derivatives) {
   const double FLOOR = 3e-15, wanted = accuracy / (derivatives || kernel->power > 1 ? 1500 : 1000);
   const double cut = wanted > FLOOR ? wanted : FLOOR;
-  unsigned order = (unsigned)ceil(-log10(cut) - 1);
-  if (order > FMM_ORDER_MAX) order = FMM_ORDER_MAX;
-  return (fmm_orders){order < 4 ? 4 : order, cut};
+  const double order = fmax(4, ceil(-log10(cut) - 1));
+  return (fmm_orders){order > FMM_ORDER_MAX ? FMM_ORDER_MAX : (unsigned)order, cut};
 }
 
 /* Above the ranks of r, r^3, r^7 and r^2 ln r at the orders that were tried, 5 .. 14, by a quarter as a rule. */

@@ -158,6 +158,10 @@ static void test_share(void) {
   T_OK(batten_fmm_create(ctx, &biharmonic, COUNT, space.y, COUNT, NULL, &o, &a), ctx);
   T_OK(batten_fmm_apply(ctx, a, space.w, NULL, u, NULL), ctx);
   o.share = a;
+  batten_context *other = t_context(NULL, NULL, 1);
+  T_STATUS(batten_fmm_create(other, &biharmonic, COUNT, space.y, COUNT, NULL, &o, &b), BATTEN_E_INVALID, other,
+           "opt.share: a plan of another context");
+  batten_context_free(other);
   T_OK(batten_fmm_create(ctx, &biharmonic, COUNT, space.y, COUNT, NULL, &o, &b), ctx);
   const batten_fmm_info i = batten_fmm_get_info(a), j = batten_fmm_get_info(b);
   batten_fmm_free(a);

@@ -33,8 +33,8 @@ typedef struct batten_fmm_options {
                       corners of cells of the tree lose one. */
   int gradients;   /* non-zero: batten_fmm_apply() will be asked for gradients. Default 0. */
   int dipoles;     /* non-zero: sources may have gradient terms g_j. Default 0. */
-  const batten_fmm *share; /* a plan of the same kernel, accuracy, gradients and dipoles, whose operators are
-                              used again in place of new ones; it may be freed before this plan. Default NULL. */
+  const batten_fmm *share; /* a plan of the same context, kernel, accuracy, gradients and dipoles, whose operators
+                              are used again in place of new ones; it may be freed before this plan. Default NULL. */
   size_t cache_bytes;      /* of an evaluator: what it may keep for batches to come, see there. Default 2^30. */
 } batten_fmm_options;
 BATTEN_API batten_fmm_options batten_fmm_options_default(void);
