@@ -80,7 +80,7 @@ static size_t bytes_with(const batten_saddle_matrix *m, const batten_saddle_opti
     if (count <= SADDLE_EXACT_MAX) break;
     size_t domains = batten_saddle_parts(count, SADDLE_OWN_MAX), own = count / domains + 1;
     size_t members = own + saddle_added(own, overlap),
-           next = batten_saddle_parts(count, SADDLE_CELL_MAX) + SADDLE_EXTREMES;
+           next = batten_saddle_parts(count, saddle_cell(count)) + SADDLE_EXTREMES;
     /* Domains have the size that halving gives, or twice that less one part where only some were too large. */
     if (count / domains < SADDLE_OWN_MAX / 2) members = SADDLE_OWN_MAX + saddle_added(SADDLE_OWN_MAX, overlap);
     grow(&held, count + saddle_added(count, overlap), sizeof(size_t));

@@ -1,10 +1,11 @@
 /* Nested levels of the unknowns, and the domains of each.
  *
- * A kd-tree halves the points of a level down to cells of at most 8. In each cell the one next to the middle of the
- * cell's box goes to the next level, which so has an eighth of the unknowns or somewhat more, spread as they are;
- * with the extreme ones along each axis, as an outlier alone holds a polynomial. The halves of at most 512 are the
- * domains' own unknowns. A domain grows beyond them along the graph of the nearest neighbours, ring by ring, and in a
- * ring nearest ones first: by distance to its box it would starve on the side where points are sparse. */
+ * A kd-tree halves the points of a level down to cells of at most 8 (4 before the last level, where that then still
+ * has room). In each cell the one next to the middle of the cell's box goes to the next level, which so has an eighth
+ * of the unknowns or somewhat more, spread as they are; with the extreme ones along each axis, as an outlier alone
+ * holds a polynomial. The halves of at most 512 are the domains' own unknowns. A domain grows beyond them along the
+ * graph of the nearest neighbours, ring by ring, and in a ring nearest ones first: by distance to its box it would
+ * starve on the side where points are sparse. */
 #include <string.h>
 
 #include "base/neighbours.h"
@@ -291,7 +292,7 @@ static void choose_extremes(unsigned dimension, size_t count, const double *x, s
 /* The next level's places on this one and its unknowns, increasing. chosen [count]: zeros. */
 static batten_status make_next(const batten_saddle *s, const saddle_level *l, const size_t *order, unsigned dimension,
                                const double *x, size_t *chosen, saddle_level *next) {
-  halves cells = halves_of(l->count, SADDLE_CELL_MAX);
+  halves cells = halves_of(l->count, saddle_cell(l->count));
   size_t low, high, at = 0, count = 0;
   while (next_half(&cells, &low, &high)) chosen[middle_of(dimension, x, order + low, high - low)] = 1;
   choose_extremes(dimension, l->count, x, chosen);

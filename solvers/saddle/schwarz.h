@@ -20,10 +20,10 @@
 
 enum {
   SADDLE_EXTREMES = 6,     /* unknowns that a level may have beyond one for each cell */
-  SADDLE_LEVELS_MAX = 20,  /* each has less than a third of the one before */
-  SADDLE_EXACT_MAX = 3000, /* unknowns that are solved exactly; between 1000 and 5000 the iterations are the same */
+  SADDLE_LEVELS_MAX = 20,  /* each but the last has less than a third of the one before */
+  SADDLE_EXACT_MAX = 3000, /* unknowns that are solved exactly */
   SADDLE_OWN_MAX = 512,    /* unknowns of a domain without the overlap: the domains have 256 to 512 */
-  SADDLE_CELL_MAX = 8,     /* unknowns of which one goes to the next level */
+  SADDLE_CELL_MAX = 8,     /* unknowns of which one goes to the next level, see saddle_cell() */
   SADDLE_GRAPH = 10,       /* nearest neighbours along which the overlap grows */
   SADDLE_BLOCK = 16384,    /* entries of a vector that are summed up at a time */
   SADDLE_DOTS = 32         /* scalar products at a time */
@@ -83,6 +83,12 @@ static inline size_t saddle_unknown(const saddle_level *l, size_t place) {
 /* Parts that halving cuts n things into until none has more than `most`. Their sizes differ by one at most, but where
  * `most` lies between. */
 size_t batten_saddle_parts(size_t n, size_t most);
+
+/* Unknowns of a cell of which one goes to the next level. Half as many where the next level would be solved exactly
+ * and has less than half of what may be: 1,000 unknowns leave more to the iteration than 2,000. */
+static inline size_t saddle_cell(size_t count) {
+  return batten_saddle_parts(count, SADDLE_CELL_MAX) < SADDLE_EXACT_MAX / 2 ? SADDLE_CELL_MAX / 2 : SADDLE_CELL_MAX;
+}
 
 /* What a task takes in around its own unknowns. */
 static inline size_t saddle_added(size_t own, double overlap) { return (size_t)(overlap * (double)own); }
