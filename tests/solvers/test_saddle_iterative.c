@@ -99,7 +99,7 @@ static void test_marks(batten_context *ctx, batten_saddle_krylov krylov) {
   T_CHECK(0 < to[0] && to[0] < to[1] && to[1] < to[2] && to[2] == a.info.iterations,
           "1e-3, 1e-6, 1e-9 after %u, %u, %u of %u iterations", to[0], to[1], to[2], a.info.iterations);
   const size_t *size = a.info.level_sizes;
-  T_CHECK(a.info.levels == 2 && size[0] == N && 0 < size[1] && size[1] < N / 4 && size[2] == 0 && size[7] == 0,
+  T_CHECK(a.info.levels == 2 && size[0] == N && 0 < size[1] && size[1] < N / 2 && size[2] == 0 && size[7] == 0,
           "levels of %zu, %zu", size[0], size[1]);
   for (int q = 0; q < 2; q++) {
     o.accuracy = q ? 2e-6 : 2e-3;
