@@ -1,7 +1,8 @@
 /* Outward normals of unoriented surface points: the choice between least energy and local planes.
  *
  * Points are moved and scaled to the unit size (see orient.h). Planes come first: they are one of energy's starts and
- * what AUTO falls back to. Energy works on all points or, above energy_points, on a well-spread subset. */
+ * what AUTO falls back to. Energy works on all points or, above energy_points, on a well-spread subset, whose field
+ * is carried to all points and refined by what they say themselves (orient_refine.c). */
 #include "orient.h"
 
 #include <math.h>
@@ -14,6 +15,8 @@
 static const double SAME = 1e-9;
 /* By which planes must be less in doubt than energy: noise, rims and uneven samples make some hundredths. */
 static const double DOUBT = 0.1;
+/* From so many times energy_points on there may be detail that the subset does not see. */
+enum { REFINE = 2 };
 /* Thickness over length; rounding of coordinates alone gives 1e-16 times their distance from 0. */
 static const double FLAT = 1e-10;
 
@@ -89,42 +92,12 @@ static batten_status check(batten_context *ctx, unsigned n, size_t count, const 
   return BATTEN_OK;
 }
 
-/* At most *found points, each the farthest from those before it, the first the farthest from the centroid; none
- * twice. chosen [*found], distance [count] of work. *found becomes how many there are. */
-static batten_status spread(batten_context *ctx, unsigned n, size_t count, const double *points, size_t *found,
-                            size_t *chosen, double *distance) {
-  size_t most = *found, first = 0;
-  double far = -1;
-  for (size_t i = 0; i < count; i++) {
-    double square = 0;
-    for (unsigned c = 0; c < n; c++) square += points[i * n + c] * points[i * n + c];
-    if (square > far) far = square, first = i;
-    distance[i] = INFINITY;
-  }
-  chosen[0] = first;
-  for (*found = 1; *found < most; ++*found) {
-    const double *last = points + chosen[*found - 1] * n;
-    size_t next = 0;
-    far = -1;
-    for (size_t i = 0; i < count; i++) {
-      double square = 0;
-      for (unsigned c = 0; c < n; c++) square += (points[i * n + c] - last[c]) * (points[i * n + c] - last[c]);
-      if (square < distance[i]) distance[i] = square;
-      if (distance[i] > far) far = distance[i], next = i;
-    }
-    if (far <= SAME * SAME) break;
-    chosen[*found] = next;
-    batten_status status = *found % 64 ? BATTEN_OK : batten_progress(ctx, "orient", 0);
-    if (status < 0) return status;
-  }
-  return BATTEN_OK;
-}
-
-/* Directions from the planes where they are sure, signs from the field's gradients. */
-static void sign_planes(const batten_orient_graph *g, const double *gradients, double *normals) {
+/* Normals in the gradients' place: directions from the planes where they are sure, signs from the field. */
+static void sign_planes(const batten_orient_graph *g, double *gradients) {
   unsigned n = g->n;
   for (size_t i = 0; i < g->count; i++) {
-    const double *gradient = gradients + i * n, *plane = g->plane + i * n;
+    double *gradient = gradients + i * n;
+    const double *plane = g->plane + i * n;
     double along = 0, square = 0;
     for (unsigned c = 0; c < n; c++) {
       along += gradient[c] * plane[c];
@@ -133,56 +106,66 @@ static void sign_planes(const batten_orient_graph *g, const double *gradients, d
     bool sure = g->flatness[i] > 0.7 && along * along > 0.25 * square;
     double length = sqrt(square);
     for (unsigned c = 0; c < n; c++)
-      normals[i * n + c] = sure || !(length > 0) ? (along < 0 ? -plane[c] : plane[c]) : gradient[c] / length;
+      gradient[c] = sure || !(length > 0) ? (along < 0 ? -plane[c] : plane[c]) : gradient[c] / length;
   }
 }
 
-/* Least energy on a subset, and what its field says at all points. */
-static batten_status orient_subset(batten_context *ctx, const batten_orient_graph *graph, const double *start,
-                                   size_t energy_points, double *normals, double *lambda) {
-  unsigned n = graph->n;
-  size_t most = energy_points < graph->count ? energy_points : graph->count;
+/* What one call holds. Points and normals stand in a tree's order: neighbours lie near each other in memory too. */
+typedef struct orientation {
+  unsigned n;
+  size_t count;
+  size_t *order;  /* [count] where a point came from */
+  double *points; /* [count][n] unit size */
+  double *planes; /* [count][n] normals by planes */
+  double *energy; /* [count][n] normals by energy */
+  batten_orient_graph graph;
+  batten_orient_forest forest;
+  batten_orient_info info;
+} orientation;
+
+/* Least energy on a subset; its field's gradients at all points come into o->energy. */
+static batten_status orient_subset(batten_context *ctx, orientation *o, size_t energy_points) {
+  unsigned n = o->n;
+  size_t most = energy_points < o->count ? energy_points : o->count;
   batten_orient_graph part = {0};
   batten_orient_field field = {0};
-  double *gradients = NULL, *points = NULL, *some = NULL;
+  double *points = NULL, *start = NULL;
   batten_status status = BATTEN_E_NOMEM;
   size_t *chosen = batten_alloc_array(ctx, most, sizeof *chosen);
-  if (!chosen || !(gradients = batten_alloc_array(ctx, graph->count, n * sizeof *gradients)) ||
-      !(points = batten_alloc_array(ctx, most, n * sizeof *points)) ||
-      !(some = batten_alloc_array(ctx, most, n * sizeof *some)))
+  if (!chosen || !(points = batten_alloc_array(ctx, most, n * sizeof *points)) ||
+      !(start = batten_alloc_array(ctx, most, n * sizeof *start)))
     goto done;
   size_t found = most;
-  if ((status = spread(ctx, n, graph->count, graph->points, &found, chosen, gradients)) < 0) goto done;
+  if ((status = batten_orient_spread(ctx, &o->graph, &found, chosen, o->energy)) < 0) goto done;
   if (found < n + 2) {
     status = batten_fail(ctx, BATTEN_E_INVALID, "points: %zu different ones; %u or more are needed", found, n + 2);
     goto done;
   }
   for (size_t i = 0; i < found; i++) {
-    memcpy(points + i * n, graph->points + chosen[i] * n, n * sizeof *points);
-    memcpy(some + i * n, start + chosen[i] * n, n * sizeof *some);
+    memcpy(points + i * n, o->points + chosen[i] * n, n * sizeof *points);
+    memcpy(start + i * n, o->planes + chosen[i] * n, n * sizeof *start);
   }
-  if ((status = batten_orient_graph_new(ctx, n, found, points, &part)) < 0) goto done;
-  if ((status = batten_orient_energy(ctx, &part, some, &field)) < 0) goto done;
-  batten_orient_field_gradients(ctx, &field, graph->count, graph->points, gradients);
-  sign_planes(graph, gradients, normals);
-  *lambda = field.lambda;
+  if ((status = batten_orient_graph_new(ctx, n, found, points, false, &part)) < 0) goto done;
+  if ((status = batten_orient_energy(ctx, &part, start, &field)) < 0) goto done;
+  status = batten_orient_field_gradients(ctx, &field, o->count, o->points, o->energy);
+  o->info.lambda = field.lambda;
+  o->info.energy_points = found;
 done:
   batten_orient_field_free(ctx, &field);
   batten_orient_graph_free(ctx, &part);
-  batten_free(ctx, some);
+  batten_free(ctx, start);
   batten_free(ctx, points);
-  batten_free(ctx, gradients);
   batten_free(ctx, chosen);
   return status;
 }
 
-static batten_status orient_all(batten_context *ctx, const batten_orient_graph *graph, const double *start,
-                                double *normals, double *lambda) {
+static batten_status orient_all(batten_context *ctx, orientation *o) {
   batten_orient_field field;
-  batten_status status = batten_orient_energy(ctx, graph, start, &field);
+  batten_status status = batten_orient_energy(ctx, &o->graph, o->planes, &field);
   if (status < 0) return status;
-  memcpy(normals, field.normals, graph->count * graph->n * sizeof *normals);
-  *lambda = field.lambda;
+  memcpy(o->energy, field.normals, o->count * o->n * sizeof *o->energy);
+  o->info.lambda = field.lambda;
+  o->info.energy_points = o->count;
   batten_orient_field_free(ctx, &field);
   return BATTEN_OK;
 }
@@ -193,42 +176,101 @@ static bool has_equal_points(const batten_orient_graph *graph) {
   return i < graph->count;
 }
 
+/* Unit size, tree's order. */
+static batten_status take_points(batten_context *ctx, orientation *o, const double *points) {
+  unsigned n = o->n;
+  batten_tree *tree = NULL;
+  double *unit = batten_alloc_array(ctx, o->count, n * sizeof *unit);
+  batten_status status = unit ? to_unit_size(ctx, n, o->count, points, unit) : BATTEN_E_NOMEM;
+  if (status >= 0) status = batten_progress(ctx, "orient", 0);
+  if (status >= 0) status = batten_tree_new(ctx, n, o->count, unit, &tree);
+  if (status < 0) goto done;
+  status = BATTEN_E_NOMEM;
+  if (!(o->order = batten_alloc_array(ctx, o->count, sizeof *o->order)) ||
+      !(o->points = batten_alloc_array(ctx, o->count, n * sizeof *o->points)))
+    goto done;
+  batten_tree_order(tree, o->order);
+  for (size_t i = 0; i < o->count; i++) memcpy(o->points + i * n, unit + o->order[i] * n, n * sizeof *unit);
+  status = BATTEN_OK;
+done:
+  batten_tree_free(ctx, tree);
+  batten_free(ctx, unit);
+  return status;
+}
+
+/* Energy in the end, where AUTO does not find planes less in doubt. */
+static batten_status orient_by_energy(batten_context *ctx, orientation *o, bool automatic, size_t energy_points) {
+  if (!(o->energy = batten_alloc_array(ctx, o->count, o->n * sizeof *o->energy))) return BATTEN_E_NOMEM;
+  bool whole = o->count <= energy_points && !has_equal_points(&o->graph), refined = false;
+  batten_status status = whole ? orient_all(ctx, o) : orient_subset(ctx, o, energy_points);
+  if (automatic && status == BATTEN_E_SINGULAR) return BATTEN_OK;
+  if (status >= 0 && o->count / REFINE >= energy_points) {
+    batten_orient_forest_plant(&o->graph, &o->forest);
+    status = batten_orient_refine(ctx, &o->graph, &o->forest, o->planes, o->energy, &o->info.pieces,
+                                  &o->info.doubtful, &refined);
+  }
+  if (status >= 0 && !whole && !refined) sign_planes(&o->graph, o->energy);
+  if (status < 0) return status;
+  if (refined || !automatic ||
+      batten_orient_doubt(&o->graph, o->energy) <= batten_orient_doubt(&o->graph, o->planes) + DOUBT)
+    o->info.method = BATTEN_ORIENT_METHOD_ENERGY;
+  return BATTEN_OK;
+}
+
+static void release(batten_context *ctx, orientation *o) {
+  batten_orient_forest_free(ctx, &o->forest);
+  batten_orient_graph_free(ctx, &o->graph);
+  batten_free(ctx, o->energy);
+  batten_free(ctx, o->planes);
+  batten_free(ctx, o->points);
+  batten_free(ctx, o->order);
+}
+
+batten_orient_options batten_orient_options_default(void) {
+  return (batten_orient_options){.struct_size = sizeof(batten_orient_options), .energy_points = 1000};
+}
+
+batten_status batten_orient_points(batten_context *ctx, unsigned n, size_t count, const double *points,
+                                   const batten_orient_options *opt, double *normals, batten_orient_info *info) {
+  batten_orient_options used = opt ? *opt : batten_orient_options_default();
+  batten_status status = batten_check_struct(ctx, "batten_orient_options", used.struct_size, sizeof used);
+  if (status >= 0) status = check(ctx, n, count, points, used.method, used.energy_points, normals);
+  if (status < 0) return status;
+  orientation o = {.n = n, .count = count, .info.method = BATTEN_ORIENT_METHOD_PLANES};
+  if ((status = take_points(ctx, &o, points)) < 0) goto done;
+  status = BATTEN_E_NOMEM;
+  if (!(o.planes = batten_alloc_array(ctx, count, n * sizeof *o.planes))) goto done;
+  bool many = count > used.energy_points;
+  if ((status = batten_progress(ctx, "orient", 0.05)) < 0) goto done;
+  if ((status = batten_orient_graph_new(ctx, n, count, o.points, many, &o.graph)) < 0) goto done;
+  if (many && (status = batten_orient_find_strays(ctx, &o.graph)) < 0) goto done;
+  if ((status = batten_orient_forest_new(ctx, &o.graph, &o.forest)) < 0) goto done;
+  if ((status = batten_orient_planes(ctx, &o.graph, &o.forest, o.planes)) < 0) goto done;
+  if (used.method != BATTEN_ORIENT_METHOD_PLANES)
+    status = orient_by_energy(ctx, &o, used.method == BATTEN_ORIENT_METHOD_AUTO, used.energy_points);
+  if (status < 0) goto done;
+  bool energy = o.info.method == BATTEN_ORIENT_METHOD_ENERGY;
+  for (size_t i = 0; i < count; i++)
+    memcpy(normals + o.order[i] * n, (energy ? o.energy : o.planes) + i * n, n * sizeof *normals);
+  o.info.strays = o.graph.strays;
+  o.info.lambda = energy ? lambda_in_box(n, count, o.points, o.info.lambda) : 0;
+  if (!energy) o.info.energy_points = o.info.pieces = o.info.doubtful = 0;
+  if (info) *info = o.info;
+done:
+  release(ctx, &o);
+  return status;
+}
+
 batten_status batten_orient(batten_context *ctx, unsigned n, size_t count, const double *points,
                             batten_orient_method method, size_t energy_points, double *normals,
                             batten_orient_method *method_used, double *lambda_used) {
-  batten_status status = check(ctx, n, count, points, method, energy_points, normals);
+  batten_orient_options opt = batten_orient_options_default();
+  batten_orient_info info;
+  opt.method = method;
+  opt.energy_points = energy_points;
+  batten_status status = batten_orient_points(ctx, n, count, points, &opt, normals, &info);
   if (status < 0) return status;
-  batten_orient_graph graph = {0};
-  double *unit = NULL, *planes = NULL, *energy = NULL, lambda = 0;
-  batten_orient_method used = BATTEN_ORIENT_METHOD_PLANES;
-  status = BATTEN_E_NOMEM;
-  if (!(unit = batten_alloc_array(ctx, count, n * sizeof *unit)) ||
-      !(planes = batten_alloc_array(ctx, count, n * sizeof *planes)))
-    goto done;
-  if ((status = to_unit_size(ctx, n, count, points, unit)) < 0) goto done;
-  if ((status = batten_progress(ctx, "orient", 0)) < 0) goto done;
-  if ((status = batten_orient_graph_new(ctx, n, count, unit, &graph)) < 0) goto done;
-  if ((status = batten_orient_planes(ctx, &graph, planes)) < 0) goto done;
-  if (method != BATTEN_ORIENT_METHOD_PLANES) {
-    status = BATTEN_E_NOMEM;
-    if (!(energy = batten_alloc_array(ctx, count, n * sizeof *energy))) goto done;
-    bool whole = count <= energy_points && !has_equal_points(&graph);
-    status = whole ? orient_all(ctx, &graph, planes, energy, &lambda)
-                   : orient_subset(ctx, &graph, planes, energy_points, energy, &lambda);
-    bool automatic = method == BATTEN_ORIENT_METHOD_AUTO;
-    if (status < 0 && !(automatic && status == BATTEN_E_SINGULAR)) goto done;
-    if (status >= 0 &&
-        !(automatic && batten_orient_doubt(&graph, energy) > batten_orient_doubt(&graph, planes) + DOUBT))
-      used = BATTEN_ORIENT_METHOD_ENERGY;
-    status = BATTEN_OK;
-  }
-  memcpy(normals, used == BATTEN_ORIENT_METHOD_ENERGY ? energy : planes, count * n * sizeof *normals);
-  if (method_used) *method_used = used;
-  if (lambda_used) *lambda_used = used == BATTEN_ORIENT_METHOD_ENERGY ? lambda_in_box(n, count, unit, lambda) : 0;
-done:
-  batten_orient_graph_free(ctx, &graph);
-  batten_free(ctx, energy);
-  batten_free(ctx, planes);
-  batten_free(ctx, unit);
+  if (method_used) *method_used = info.method;
+  if (lambda_used) *lambda_used = info.lambda;
   return status;
 }

@@ -180,36 +180,45 @@ typedef struct gradient_task {
   const batten_orient_field *field;
   const double *points;
   double *gradients;
-  size_t count;
+  size_t first, last;
 } gradient_task;
 
-enum { CHUNK = 64 };
+enum { LANES = 32, SLICE = 1024 * LANES };
 
+/* A few points side by side, so that the loop over them fills vectors: 3 a r e - 3 (r b + e (e . b) / r). In the
+ * plane the third coordinates are 0. */
 static void find_gradients(void *task, size_t chunk) {
-  gradient_task *t = task;
+  const gradient_task *t = task;
   const batten_orient_field *f = t->field;
   unsigned n = f->n;
-  size_t end = (chunk + 1) * CHUNK < t->count ? (chunk + 1) * CHUNK : t->count;
-  for (size_t i = chunk * CHUNK; i < end; i++) {
-    double y[3] = {0}, sum[3] = {f->c[0], f->c[1], f->c[2]};
-    for (unsigned c = 0; c < n; c++) y[c] = t->points[i * n + c] - f->middle[c];
-    for (size_t j = 0; j < f->count; j++) { /* 3 a r e - 3 (r b + e (e . b) / r) */
-      double e[3], square = 0, along = 0;
-      for (unsigned c = 0; c < n; c++) {
-        e[c] = y[c] - f->points[j * n + c];
-        square += e[c] * e[c];
-        along += e[c] * f->b[j * n + c];
-      }
-      if (square == 0) continue;
-      double r = sqrt(square), radial = 3 * (f->a[j] * r - along / r);
-      for (unsigned c = 0; c < n; c++) sum[c] += radial * e[c] - 3 * r * f->b[j * n + c];
+  size_t begin = t->first + chunk * LANES, count = t->last - begin < LANES ? t->last - begin : LANES;
+  double x[3][LANES] = {{0}}, sum[3][LANES] = {{0}};
+  for (size_t i = 0; i < count; i++)
+    for (unsigned c = 0; c < n; c++) x[c][i] = t->points[(begin + i) * n + c] - f->middle[c];
+  for (size_t j = 0; j < f->count; j++) {
+    double y[3] = {0}, b[3] = {0}, a = f->a[j];
+    for (unsigned c = 0; c < n; c++) y[c] = f->points[j * n + c], b[c] = f->b[j * n + c];
+    for (size_t i = 0; i < LANES; i++) {
+      double e0 = x[0][i] - y[0], e1 = x[1][i] - y[1], e2 = x[2][i] - y[2];
+      double square = e0 * e0 + e1 * e1 + e2 * e2, r = sqrt(square);
+      double radial = a * r - (e0 * b[0] + e1 * b[1] + e2 * b[2]) / (r + 1e-300); /* r = 0: 0 / 1e-300 */
+      sum[0][i] += radial * e0 - r * b[0];
+      sum[1][i] += radial * e1 - r * b[1];
+      sum[2][i] += radial * e2 - r * b[2];
     }
-    for (unsigned c = 0; c < n; c++) t->gradients[i * n + c] = sum[c];
   }
+  for (size_t i = 0; i < count; i++)
+    for (unsigned c = 0; c < n; c++) t->gradients[(begin + i) * n + c] = 3 * sum[c][i] + f->c[c];
 }
 
-void batten_orient_field_gradients(batten_context *ctx, const batten_orient_field *field, size_t count,
-                                   const double *points, double *gradients) {
-  gradient_task task = {field, points, gradients, count};
-  batten_parallel(ctx, (count + CHUNK - 1) / CHUNK, find_gradients, &task);
+batten_status batten_orient_field_gradients(batten_context *ctx, const batten_orient_field *field, size_t count,
+                                            const double *points, double *gradients) {
+  for (size_t first = 0; first < count; first += SLICE) {
+    size_t last = first + SLICE < count ? first + SLICE : count;
+    batten_status status = batten_progress(ctx, "orient", 0.7 + 0.2 * (double)first / (double)count);
+    if (status < 0) return status;
+    batten_parallel(ctx, (last - first + LANES - 1) / LANES, find_gradients,
+                    &(gradient_task){field, points, gradients, first, last});
+  }
+  return BATTEN_OK;
 }

@@ -1,11 +1,8 @@
 /* Orientation by local planes: cheap, for many points.   [after Hoppe, DeRose, Duchamp, McDonald, Stuetzle 1992]
  *
- *   1. Each pair of neighbours ties the signs of two planes, the firmer the better the planes fit to one surface and
- *      the more the pair lies in both (batten_orient_agreement).
- *   2. Kruskal's minimum spanning forest settles the firmest ties first; a union-find with parity carries the signs,
- *      so no walk over the tree is needed. Loose ties do not join what is closed already: bodies that nearly touch.
- *   3. Each tree is turned so that its extreme points look outwards, and turned round again when it lies inside
- *      an odd number of the others (winding numbers): the walls of cavities.
+ *   1. The forest of firmest ties gives each of its trees signs that agree (orient_forest.c).
+ *   2. Each tree is turned so that its extreme points look outwards, and turned round again when it lies inside
+ *      an odd number of the others (winding numbers): the walls of cavities. Strays are no extreme points.
  *
  * Time O(N log N) + (components whose boxes overlap) x N. */
 #include <math.h>
@@ -14,117 +11,21 @@
 #include "base/checked.h"
 #include "orient.h"
 
-/* A tie with less than 0.3 left of its agreement does not join two trees that are closed surfaces already. */
-static const double LOOSE = 0.7;
-static const double CLOSED = 0.1; /* openness of random samples of a torus: 0.03 */
+/* Pieces that are looked at between two looks at the host. */
+enum { SLICE = 64 };
 
-typedef struct tie {
-  double weight; /* 0 firm .. 1 loose */
-  size_t from;   /* i * k + q: the tie to the q-th neighbour of i */
-} tie;
-
-static bool firmer(tie a, tie b) { return a.weight < b.weight || (a.weight == b.weight && a.from < b.from); }
-
-/* Merge sort from the bottom up: firm order, no memory of its own, no recursion. spare [count]. */
-static void sort_ties(size_t count, tie *ties, tie *spare) {
-  tie *from = ties, *to = spare;
-  for (size_t width = 1; width < count; width *= 2) {
-    for (size_t low = 0; low < count; low += 2 * width) {
-      size_t mid = low + width < count ? low + width : count, end = mid + width < count ? mid + width : count;
-      for (size_t a = low, b = mid, out = low; out < end; out++)
-        to[out] = a < mid && (b == end || !firmer(from[b], from[a])) ? from[a++] : from[b++];
-    }
-    tie *t = from;
-    from = to;
-    to = t;
-  }
-  if (from != ties) memcpy(ties, from, count * sizeof *ties);
-}
-
-static double tie_weight(const batten_orient_graph *g, size_t i, size_t j) {
-  unsigned n = g->n;
-  const double *x = g->points + i * n, *y = g->points + j * n, *u = g->plane + i * n, *v = g->plane + j * n;
-  double eu = 0, ev = 0, square = 0;
-  for (unsigned c = 0; c < n; c++) {
-    double e = y[c] - x[c];
-    square += e * e;
-    eu += e * u[c];
-    ev += e * v[c];
-  }
-  /* part of the pair that stands off the planes: noise there looks like the other side of a wall */
-  double off = square > 0 ? fmax(eu * eu, ev * ev) / square : 0;
-  return 1 - fabs(batten_orient_agreement(n, x, y, u, v)) * (1 - off);
-}
-
-/* Root of i; turned[i] says whether i's sign is opposite to its parent's (afterwards: to the root's). */
-static size_t find_root(size_t *parent, unsigned char *turned, size_t i) {
-  while (parent[i] != parent[parent[i]]) { /* halve the path */
-    turned[i] ^= turned[parent[i]];
-    parent[i] = parent[parent[i]];
-  }
-  return parent[i];
-}
-
-/* Signed area so far of the tree below a root. */
-typedef struct area {
-  double sum[3], total;
-} area;
-
-static bool closed(const area *a, unsigned n) {
-  double square = 0;
-  for (unsigned c = 0; c < n; c++) square += a->sum[c] * a->sum[c];
-  return square < CLOSED * CLOSED * a->total * a->total;
-}
-
-typedef struct forest {
-  size_t *parent, *piece; /* [count] */
-  unsigned char *turned, *rank;
-  area *areas;
-} forest;
-
-static void plant(const batten_orient_graph *g, forest *f) {
-  unsigned n = g->n;
-  for (size_t i = 0; i < g->count; i++) {
-    f->parent[i] = i;
-    f->turned[i] = f->rank[i] = 0;
-    f->areas[i].total = batten_orient_area(g, i);
-    for (unsigned c = 0; c < 3; c++) f->areas[i].sum[c] = c < n ? f->areas[i].total * g->plane[i * n + c] : 0;
-  }
-}
-
-/* Joins the trees of i and j, whose planes agree up to sign. */
-static void join(const batten_orient_graph *g, const tie *t, forest *f) {
-  size_t i = t->from / g->k, j = g->index[t->from];
-  size_t a = find_root(f->parent, f->turned, i), b = find_root(f->parent, f->turned, j);
-  if (a == b || (t->weight > LOOSE && closed(&f->areas[a], g->n) && closed(&f->areas[b], g->n))) return;
-  const double *x = g->points, *u = g->plane;
-  double agreement = batten_orient_agreement(g->n, x + i * g->n, x + j * g->n, u + i * g->n, u + j * g->n);
-  bool opposed = (agreement < 0) != ((i != a && f->turned[i]) != (j != b && f->turned[j]));
-  if (f->rank[a] < f->rank[b]) {
-    size_t r = a;
-    a = b;
-    b = r;
-  }
-  if (f->rank[a] == f->rank[b]) f->rank[a]++;
-  f->parent[b] = a;
-  f->turned[b] = opposed;
-  f->areas[a].total += f->areas[b].total;
-  for (unsigned c = 0; c < 3; c++) f->areas[a].sum[c] += opposed ? -f->areas[b].sum[c] : f->areas[b].sum[c];
-}
-
-/* Steps 1 and 2. piece [count]: label of each point's component, numbered by first point. Returns how many. */
-static size_t propagate(const batten_orient_graph *g, size_t count, const tie *ties, forest *f, double *normals) {
+/* Planes turned as the forest says; piece [count]: label of each point's component, numbered by first point. Returns
+ * how many. */
+static size_t turn_planes(const batten_orient_graph *g, batten_orient_forest *f, size_t *piece, double *normals) {
   unsigned n = g->n;
   size_t pieces = 0;
-  plant(g, f);
-  for (size_t t = 0; t < count; t++) join(g, ties + t, f);
-  for (size_t i = 0; i < g->count; i++) f->piece[i] = SIZE_MAX;
+  bool opposed;
+  for (size_t i = 0; i < g->count; i++) piece[i] = SIZE_MAX;
   for (size_t i = 0; i < g->count; i++) {
-    size_t root = find_root(f->parent, f->turned, i);
-    double sign = i != root && f->turned[i] ? -1 : 1;
-    for (unsigned c = 0; c < n; c++) normals[i * n + c] = sign * g->plane[i * n + c];
-    if (f->piece[root] == SIZE_MAX) f->piece[root] = pieces++; /* a root may come after its points */
-    f->piece[i] = f->piece[root];
+    size_t root = batten_orient_forest_root(f, i, &opposed);
+    for (unsigned c = 0; c < n; c++) normals[i * n + c] = opposed ? -g->plane[i * n + c] : g->plane[i * n + c];
+    if (piece[root] == SIZE_MAX) piece[root] = pieces++; /* a root may come after its points */
+    piece[i] = piece[root];
   }
   return pieces;
 }
@@ -141,6 +42,7 @@ static void find_boxes(const batten_orient_graph *g, size_t pieces, const size_t
   for (size_t i = 0; i < g->count; i++) {
     box *b = boxes + piece[i];
     const double *x = g->points + i * n;
+    if (g->area[i] == 0 && b->lower[0] < INFINITY) continue; /* a stray: only where there is nothing else */
     if (x[0] < b->lower[0]) b->extreme = i;
     for (unsigned c = 0; c < n; c++) {
       b->lower[c] = fmin(b->lower[c], x[c]);
@@ -159,7 +61,7 @@ static double winding(const batten_orient_graph *g, const double *normals, size_
     flux += d * normals[j * g->n + c];
   }
   if (square == 0) return 0;
-  return flux * batten_orient_area(g, j) / (full * (g->n == 2 ? square : square * sqrt(square)));
+  return flux * g->area[j] / (full * (g->n == 2 ? square : square * sqrt(square)));
 }
 
 /* Number of other components around component p. order: points sorted by component, start [pieces + 1]. */
@@ -179,12 +81,40 @@ static size_t depth(const batten_orient_graph *g, const double *normals, size_t 
   return around;
 }
 
+typedef struct depth_task {
+  const batten_orient_graph *graph;
+  const double *normals;
+  size_t pieces;
+  const box *boxes;
+  const size_t *order, *start;
+  unsigned char *inside;
+  size_t first;
+} depth_task;
+
+static void find_depth(void *task, size_t index) {
+  const depth_task *t = task;
+  size_t p = t->first + index;
+  t->inside[p] = depth(t->graph, t->normals, t->pieces, t->boxes, t->order, t->start, p) & 1;
+}
+
+/* Puts the strays behind the others, unless all are; returns how many the others are. */
+static size_t drop_strays(const batten_orient_graph *g, size_t count, size_t *members) {
+  size_t kept = 0;
+  for (size_t q = 0; q < count; q++) {
+    size_t i = members[q];
+    if (g->area[i] == 0) continue;
+    members[q] = members[kept];
+    members[kept++] = i;
+  }
+  return kept ? kept : count;
+}
+
 static void turn(const batten_orient_graph *g, size_t begin, size_t end, const size_t *order, double *normals) {
   for (size_t s = begin; s < end; s++)
     for (unsigned c = 0; c < g->n; c++) normals[order[s] * g->n + c] *= -1;
 }
 
-/* Step 3. */
+/* Step 2. */
 static batten_status settle_components(batten_context *ctx, const batten_orient_graph *g, size_t pieces,
                                        const size_t *piece, double *normals) {
   batten_status status = BATTEN_E_NOMEM;
@@ -204,12 +134,15 @@ static batten_status settle_components(batten_context *ctx, const batten_orient_
   start[pieces] = g->count;
 
   find_boxes(g, pieces, piece, boxes);
-  for (size_t p = 0; p < pieces; p++)
-    if (batten_orient_outwardness(g->n, g->points, normals, start[p + 1] - start[p], order + start[p]) < 0)
-      turn(g, start[p], start[p + 1], order, normals);
   for (size_t p = 0; p < pieces; p++) {
-    if ((status = batten_progress(ctx, "orient", (double)p / (double)pieces)) < 0) goto done;
-    inside[p] = depth(g, normals, pieces, boxes, order, start, p) & 1;
+    size_t members = drop_strays(g, start[p + 1] - start[p], order + start[p]);
+    if (batten_orient_outwardness(g->n, g->points, normals, members, order + start[p]) < 0)
+      turn(g, start[p], start[p + 1], order, normals);
+  }
+  depth_task task = {g, normals, pieces, boxes, order, start, inside, 0};
+  for (; task.first < pieces; task.first += SLICE) {
+    if ((status = batten_progress(ctx, "orient", 0.4)) < 0) goto done;
+    batten_parallel(ctx, pieces - task.first < SLICE ? pieces - task.first : SLICE, find_depth, &task);
   }
   for (size_t p = 0; p < pieces; p++)
     if (inside[p]) turn(g, start[p], start[p + 1], order, normals);
@@ -222,29 +155,11 @@ done:
   return status;
 }
 
-batten_status batten_orient_planes(batten_context *ctx, const batten_orient_graph *g, double *normals) {
-  size_t pairs = g->count * g->k, count = 0; /* the graph holds so many */
-  batten_status status = BATTEN_E_NOMEM;
-  tie *spare = NULL, *ties = batten_alloc_array(ctx, pairs, sizeof *ties);
-  forest f = {0};
-  if (!ties || !(spare = batten_alloc_array(ctx, pairs, sizeof *spare)) ||
-      !(f.parent = batten_alloc_array(ctx, g->count, sizeof *f.parent)) ||
-      !(f.piece = batten_alloc_array(ctx, g->count, sizeof *f.piece)) || !(f.turned = batten_alloc(ctx, g->count)) ||
-      !(f.rank = batten_alloc(ctx, g->count)) || !(f.areas = batten_alloc_array(ctx, g->count, sizeof *f.areas)))
-    goto done;
-  for (size_t i = 0; i < g->count; i++)
-    for (size_t q = 0; q < g->k; q++) ties[count++] = (tie){tie_weight(g, i, g->index[i * g->k + q]), i * g->k + q};
-  sort_ties(count, ties, spare);
-  if ((status = batten_progress(ctx, "orient", 0.5)) < 0) goto done;
-  size_t pieces = propagate(g, count, ties, &f, normals);
-  status = settle_components(ctx, g, pieces, f.piece, normals);
-done:
-  batten_free(ctx, f.areas);
-  batten_free(ctx, f.rank);
-  batten_free(ctx, f.turned);
-  batten_free(ctx, f.piece);
-  batten_free(ctx, f.parent);
-  batten_free(ctx, spare);
-  batten_free(ctx, ties);
+batten_status batten_orient_planes(batten_context *ctx, const batten_orient_graph *g, batten_orient_forest *forest,
+                                   double *normals) {
+  size_t *piece = batten_alloc_array(ctx, g->count, sizeof *piece);
+  batten_status status = piece ? batten_orient_forest_join(ctx, g, forest, INFINITY) : BATTEN_E_NOMEM;
+  if (status >= 0) status = settle_components(ctx, g, turn_planes(g, forest, piece, normals), piece, normals);
+  batten_free(ctx, piece);
   return status;
 }

@@ -81,7 +81,7 @@ static void test_subset(batten_context *ctx) {
   s_free(&s);
   s = s_new("plate, sides a third of the subset's spacing apart", 3);
   s_plate(&s, 60, 2, 0.3, 5);
-  s_orient(ctx, &s, automatic, 200, planes, 100, 85); /* the subset sees one sheet: it does not close */
+  s_orient(ctx, &s, automatic, 200, energy, 100, 85); /* the subset sees one sheet, Gauss's formula two */
   s_free(&s);
   s = s_new("torus, every point twice", 3);
   s_torus(&s, 200, (double[3]){0}, 1, 0.35, 2, 1);

@@ -156,25 +156,52 @@ BATTEN_API const double *batten_solid_points(const batten_solid *s, size_t *coun
 BATTEN_API batten_solid *batten_solid_retain(batten_solid *s);
 BATTEN_API void batten_solid_free(batten_solid *s);
 
+typedef struct batten_orient_options {
+  size_t struct_size;
+  batten_orient_method method;
+  size_t energy_points; /* least energy works on at most so many points, more than n + 1. Default 1000. PLANES does
+                           not read it. */
+} batten_orient_options;
+BATTEN_API batten_orient_options batten_orient_options_default(void);
+
+typedef struct batten_orient_info {
+  batten_orient_method method; /* ENERGY or PLANES */
+  double lambda;        /* at which the signs were settled, as smoothing of batten_spline_options (unit box); 0 with
+                           PLANES */
+  size_t energy_points; /* that least energy worked on; 0 with PLANES */
+  size_t strays;   /* points off the surface, only looked for above energy_points: they get normals too, but have no
+                      say in those of others */
+  size_t pieces;   /* sure pieces whose signs were settled above energy_points */
+  size_t doubtful; /* points above energy_points whose sign is not sure: on a piece that fits turned round about as
+                      well, or on none and with field and neighbours at odds */
+} batten_orient_info;
+
 /* Normals of unoriented surface points: normals [count][n], outward unit vectors, n = 2 or 3, count >= n + 2.
  *
  *   ENERGY  the unit gradients of the spline (kernel r^3, linear part) of least energy that is 0 at the points
  *           [Huang, Carr, Ju 2019]. Values are smoothed: the spline minimises |f|^2 + sum f(x_i)^2 / lambda. lambda
  *           walks down by tens from 1e-2 (points scaled to twice their root mean square distance from the centroid)
- *           until the signs stay put. Above energy_points a well-spread subset is oriented so; the gradient of its f
- *           gives the others their sign, and their direction where local planes are unsure. Walls thinner than about
- *           half of the subset's spacing are lost. About 8 ((n + 1) E)^2 bytes, and 20 E^3 flops for each of 2 to 5
- *           lambdas, for E points.
+ *           until the signs stay put. About 8 ((n + 1) E)^2 bytes, and 20 E^3 flops for each of 2 to 5 lambdas, for E
+ *           points. Above energy_points a well-spread subset is oriented so, and its f is carried to all points:
+ *           those that firm ties between neighbours join to pieces take the piece's sign, which is the one that fits
+ *           Gauss's formula sum of a_j n_j . (x_j - x) / |x_j - x|^3 = 2 pi at the points best, with f's gradient
+ *           where that decides nothing; the others hang on by ties or take the sign, and where local planes are
+ *           unsure the direction, of the gradient. Walls thinner than the subset's spacing are right so, down to 2 or
+ *           3 spacings of all points. About 600 bytes for each point (n = 3) beside the subset, O(N log N + N E).
  *   PLANES  planes through nearest neighbours, signs along a spanning forest: for dense, even samples. O(N log N).
- *   AUTO    ENERGY; PLANES when energy's normals are rougher between neighbours plus less closed as a surface
- *           (|sum of area normal| / area) by more than 0.1, or when its matrix is singular.
+ *   AUTO    ENERGY; up to energy_points PLANES where energy's normals are rougher between neighbours plus less
+ *           closed as a surface (|sum of area normal| / area) by more than 0.1, and where its matrix is singular.
  *
- * Outward: extreme points look away from the rest. energy_points: more than n + 1, batten_solid_options takes 1000;
- * PLANES does not read it. method_used: ENERGY or PLANES. lambda_used: the lambda at which the signs were settled, as
- * smoothing of batten_spline_options (unit box); 0 with PLANES. Both may be NULL. Points that coincide get the same
- * normal from ENERGY. The result does not depend on the order of the points, up to ties in distance, nor on the
- * context's threads; with other threads of BLAS it differs by rounding. Progress phase "orient".
- * Fails: INVALID, NOMEM, TOO_LARGE, SINGULAR (all on one line or plane), CANCELLED. */
+ * Planes go through 10 (4) neighbours, above energy_points through up to 160 where noise makes these no plane: noise
+ * of one spacing of the points is well. Points far off the surface turn nothing. Outward: extreme points look away
+ * from the rest (PLANES, and ENERGY up to energy_points). Points that coincide get the same normal from ENERGY. The
+ * result does not depend on the order of the points, up to ties in distance, nor on the context's threads; with other
+ * threads of BLAS it differs by rounding. Progress phase "orient". opt NULL: defaults; info may be NULL. Fails:
+ * INVALID, NOMEM, TOO_LARGE, SINGULAR (all on one line or plane), CANCELLED. */
+BATTEN_API batten_status batten_orient_points(batten_context *ctx, unsigned n, size_t count, const double *points,
+                                              const batten_orient_options *opt, double *normals,
+                                              batten_orient_info *info);
+/* The same with options and results one by one; method_used and lambda_used may be NULL. */
 BATTEN_API batten_status batten_orient(batten_context *ctx, unsigned n, size_t count, const double *points,
                                        batten_orient_method method, size_t energy_points, double *normals,
                                        batten_orient_method *method_used, double *lambda_used);
