@@ -19,6 +19,7 @@ enum {
   OPT_CARRIER = BODY_KEY_OWN,
   OPT_ORDER,
   OPT_SMOOTHING,
+  OPT_NOISE,
   OPT_MERGE,
   OPT_REDUCE,
   OPT_ORIENTATION,
@@ -39,6 +40,9 @@ static const cli_option table[] = {
      "default auto"},
     {"order", OPT_ORDER, "M", "order of the spline's energy, 2 to 4; default 2"},
     {"smoothing", OPT_SMOOTHING, "RHO", "0 passes through the points, larger is smoother; default 0"},
+    {"noise", OPT_NOISE, "SIGMA",
+     "distance of the points from the surface (standard deviation), or auto:\nestimated; finds the smoothing; "
+     "default 0"},
     {"merge-radius", OPT_MERGE, "R", "points closer than this become one; default 0: equal points only"},
     {"reduce", OPT_REDUCE, "DISTANCE",
      "use so few of the points as centres that the surface is within this\n"
@@ -103,6 +107,12 @@ static bool take_fit_option(solid_request *q, int key, const char *v) {
       break;
     case OPT_SMOOTHING:
       ok = cli_parse_number("--smoothing", v, 0, INFINITY, &q->fit.spline.smoothing);
+      break;
+    case OPT_NOISE:
+      if (strcmp(v, "auto") == 0)
+        q->fit.noise = BATTEN_NOISE_ESTIMATE;
+      else
+        ok = cli_parse_number("--noise", v, 0, INFINITY, &q->fit.noise);
       break;
     case OPT_MERGE:
       ok = cli_parse_number("--merge-radius", v, 0, INFINITY, &q->fit.merge_radius);

@@ -75,7 +75,8 @@ static void report_fit(const solid_work *w, cli_report *r) {
   batten_spline_get_parts(batten_solid_spline(w->body.solid), &parts);
   cli_report_text(r, "carrier", carrier_name(w));
   cli_report_count(r, "order", parts.m);
-  cli_report_number(r, "smoothing", w->request->fit.spline.smoothing);
+  cli_report_number(r, "smoothing", i->smoothing);
+  cli_report_number(r, "noise", i->noise);
   cli_report_count(r, "centers", parts.count);
   report_reduction(w, r);
   cli_report_text(r, "method", batten_saddle_method_name(s->method));
@@ -83,6 +84,7 @@ static void report_fit(const solid_work *w, cli_report *r) {
   report_iteration(w, r);
   cli_report_number(r, "residual_max", i->residual_max);
   cli_report_number(r, "distance_max", i->distance_max);
+  cli_report_number(r, "distance_rms", i->distance_rms);
   cli_report_number(r, "rcond", iterative ? NAN : s->rcond);
   cli_report_number(r, "loo_rms", i->spline.loo_rms);
   cli_report_count(r, "loo_samples", i->spline.loo_samples);

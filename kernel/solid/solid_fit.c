@@ -6,6 +6,7 @@
 
 #include "base/checked.h"
 #include "solid/solid_inner.h"
+#include "solid/solid_noise.h"
 
 batten_solid_options batten_solid_options_default(void) {
   return (batten_solid_options){.struct_size = sizeof(batten_solid_options),
@@ -20,7 +21,7 @@ typedef struct attempt {
   batten_solid *solid;
   batten_spline_info spline;
   batten_spline_reduce_info reduced;
-  double value_range;
+  double value_range, smoothing;
   batten_orient_data data; /* AUTO: the carrier alone */
   batten_sign_check check;
 } attempt;
@@ -56,6 +57,12 @@ static batten_status check_options(batten_context *ctx, unsigned n, const batten
   if (st < 0) return st;
   if (!(o->merge_radius >= 0) || !isfinite(o->merge_radius))
     return batten_fail(ctx, BATTEN_E_INVALID, "opt.merge_radius: %g; give a length >= 0", o->merge_radius);
+  if (!isfinite(o->noise))
+    return batten_fail(ctx, BATTEN_E_INVALID, "opt.noise: %g; give a length, 0, or BATTEN_NOISE_ESTIMATE", o->noise);
+  if (o->noise != 0 && (o->spline.smoothing != 0 || o->spline.smoothing_per_point))
+    return batten_fail(ctx, BATTEN_E_INVALID,
+                       "opt.noise: %g beside opt.spline.smoothing%s; noise finds the smoothing: give one of them",
+                       o->noise, o->spline.smoothing_per_point ? "_per_point" : "");
   if (!(o->pair_distance > 0 && o->pair_distance <= 1))
     return batten_fail(ctx, BATTEN_E_INVALID, "opt.pair_distance: %g; give 0 < it <= 1", o->pair_distance);
   if (!(o->reduce >= 0) || !isfinite(o->reduce))
@@ -64,6 +71,11 @@ static batten_status check_options(batten_context *ctx, unsigned n, const batten
     return batten_fail(ctx, BATTEN_E_INVALID,
                        "opt.reduce: %g with opt.orient_data gradients; a tolerance is for points alone, give pairs",
                        o->reduce);
+  if (o->reduce > 0 && o->noise != 0)
+    return batten_fail(
+        ctx, BATTEN_E_INVALID,
+        "opt.noise: %g beside opt.reduce: %g; a tolerance holds the points that noise lets go: give one of them",
+        o->noise, o->reduce);
   if (o->check_cells < 8 || o->check_cells > 1000)
     return batten_fail(ctx, BATTEN_E_INVALID, "opt.check_cells: %zu; give 8 to 1000", o->check_cells);
   if (2 * o->spline.m <= n || o->spline.m > 4)
@@ -202,25 +214,82 @@ static batten_status check_attempt(fit_state *f, attempt *a) {
   return st;
 }
 
+static batten_status fit_oriented(fit_state *f, attempt *a) {
+  if (a->data == BATTEN_ORIENT_DATA_GRADIENTS)
+    return batten_solid_fit_gradients(f->ctx, &f->data, f->normals, &f->opt, &a->solid, &a->spline, &a->value_range);
+  batten_status st = need_carrier(f);
+  if (st < 0) return st;
+  return batten_solid_fit_pairs(f->ctx, &f->data, f->normals, f->carrier, &f->opt, &a->solid, &a->spline, &a->reduced,
+                                &a->value_range);
+}
+
+/* ---- smoothing that noise asks for ---------------------------------------------------------------- */
+
+typedef batten_status (*fit_function)(fit_state *f, attempt *a);
+
+typedef struct smoothing_search {
+  fit_state *f;
+  fit_function fit;
+  attempt *last;
+} smoothing_search;
+
+static batten_status try_smoothing(batten_context *ctx, void *user, double rho, double *rms) {
+  smoothing_search *s = user;
+  attempt next = {.data = s->last->data};
+  s->f->opt.spline.smoothing = rho;
+  batten_status st = s->fit(s->f, &next);
+  if (st >= 0)
+    st = batten_solid_rms_distance(ctx, next.solid, s->f->data.count, s->f->data.points, s->f->info.noise, rms);
+  batten_solid_free(s->last->solid);
+  *s->last = next;
+  return st;
+}
+
+/* rho of the kind of fit from a subset, for all points: see solid_noise.c. */
+static batten_status start_smoothing(fit_state *f, fit_function fit, batten_orient_data data, double *rho) {
+  fit_state sub = *f;
+  attempt last = {.data = data};
+  double reached;
+  sub.data = (surface_data){0};
+  batten_status st = batten_solid_noise_subset(f->ctx, &f->data, &f->opt, f->normals, &sub.data, &sub.normals);
+  if (st >= 0) {
+    sub.opt.spline.loo_samples = 0;
+    st = batten_solid_find_smoothing(f->ctx, f->info.noise, *rho, try_smoothing,
+                                     &(smoothing_search){&sub, fit, &last}, rho, &reached);
+  }
+  if (st >= 0) *rho *= sqrt((double)f->data.count / (double)sub.data.count);
+  batten_solid_free(last.solid);
+  f->carrier = sub.carrier; /* one that was needed stays */
+  batten_surface_data_free(f->ctx, &sub.data);
+  return st;
+}
+
+/* One fit, or as many as the smoothing takes that opt.noise asks for. */
+static batten_status fit_smoothed(fit_state *f, fit_function fit, attempt *a) {
+  double rho = 1e-4, reached = 0;
+  batten_status st = BATTEN_OK;
+  if (f->info.noise == 0) return fit(f, a);
+  if (batten_solid_noise_is_large(&f->data)) st = start_smoothing(f, fit, a->data, &rho);
+  if (st < 0) return st;
+  st = batten_solid_find_smoothing(f->ctx, f->info.noise, rho, try_smoothing, &(smoothing_search){f, fit, a}, &rho,
+                                   &reached);
+  if (st >= 0 && f->opt.spline.smoothing != rho) /* the last one tried was not the best */
+    st = try_smoothing(f->ctx, &(smoothing_search){f, fit, a}, rho, &reached);
+  a->smoothing = rho;
+  return st;
+}
+
 static batten_status try_carrier(fit_state *f, attempt *a) {
   double start = batten_now();
-  batten_status st = fit_with_carrier(f, a);
+  batten_status st = fit_smoothed(f, fit_with_carrier, a);
   f->info.time_fit_s += batten_now() - start;
   return st < 0 ? st : check_attempt(f, a);
 }
 
 static batten_status try_oriented(fit_state *f, batten_orient_data data, attempt *a) {
   double start = batten_now();
-  batten_status st = BATTEN_OK;
   a->data = data;
-  if (data == BATTEN_ORIENT_DATA_GRADIENTS) {
-    st = batten_solid_fit_gradients(f->ctx, &f->data, f->normals, &f->opt, &a->solid, &a->spline, &a->value_range);
-  } else {
-    st = need_carrier(f);
-    if (st >= 0)
-      st = batten_solid_fit_pairs(f->ctx, &f->data, f->normals, f->carrier, &f->opt, &a->solid, &a->spline,
-                                  &a->reduced, &a->value_range);
-  }
+  batten_status st = fit_smoothed(f, fit_oriented, a);
   f->info.time_fit_s += batten_now() - start;
   return st < 0 ? st : check_attempt(f, a);
 }
@@ -297,7 +366,8 @@ enum { GRADIENT_POINTS = 2000 };
 static batten_status cure(fit_state *f) {
   batten_orient_data kinds[2] = {f->opt.orient_data, f->opt.orient_data};
   if (f->opt.orient_data == BATTEN_ORIENT_DATA_AUTO) {
-    bool small = (f->data.count <= GRADIENT_POINTS || f->data.n == 1) && f->opt.reduce == 0;
+    /* Gradients are held exactly, those estimated from noisy points too: smoothing could not mend them. */
+    bool small = ((f->data.count <= GRADIENT_POINTS && f->info.noise == 0) || f->data.n == 1) && f->opt.reduce == 0;
     kinds[0] = small ? BATTEN_ORIENT_DATA_GRADIENTS : BATTEN_ORIENT_DATA_PAIRS;
     kinds[1] = BATTEN_ORIENT_DATA_PAIRS;
   }
@@ -334,7 +404,9 @@ static batten_status measure_residual(fit_state *f) {
     for (size_t k = 0; k < n; k++) square += gradients[i * n + k] * gradients[i * n + k];
     f->info.residual_max = fmax(f->info.residual_max, fabs(values[i]) / f->best.value_range);
     if (values[i] != 0) f->info.distance_max = fmax(f->info.distance_max, fabs(values[i]) / sqrt(square));
+    if (values[i] != 0) f->info.distance_rms += values[i] * values[i] / square / (double)d->count;
   }
+  f->info.distance_rms = sqrt(f->info.distance_rms);
   batten_free(f->ctx, values);
   return st;
 }
@@ -379,6 +451,7 @@ static batten_status finish(fit_state *f) {
   info->check_final = f->best.check;
   info->spline = f->best.spline;
   info->reduced = f->best.reduced;
+  info->smoothing = info->noise > 0 ? f->best.smoothing : f->opt.spline.smoothing;
   info->spacing = f->data.spacing_median;
   info->sign = !f->best.check.clean ? BATTEN_SIGN_AMBIGUOUS : first_was_left ? BATTEN_SIGN_CURED : BATTEN_SIGN_CLEAN;
   if (!f->best.check.clean) return ambiguous(f);
@@ -437,6 +510,8 @@ batten_status batten_solid_fit(batten_context *ctx, unsigned n, size_t count, co
   if (st < 0) return st;
   f.carrier = share(f.opt.carrier);
   st = batten_surface_data_make(ctx, n, count, points, &f.opt, &f.data);
+  f.info.noise = fmax(f.opt.noise, 0);
+  if (st >= 0 && f.opt.noise < 0 && n > 1) st = batten_solid_estimate_noise(ctx, &f.data, &f.info.noise);
   if (st < 0) goto done;
   if (orientation_comes_first(&f)) {
     st = cure(&f);

@@ -199,12 +199,41 @@ done:
   return st;
 }
 
+/* Up to so many points each has its pair: the sign and slope are then wanted everywhere, and the system of three
+ * times as many unknowns is still small. Above that every point keeps its own zero, and of eight that lie together,
+ * as a tree has them, one has a pair, another one where it looks the other way: the two sides of something thin. */
+enum { PAIRS_EVERYWHERE = 50000, TOGETHER = 8 };
+
+/* bearer [count]: whether a point gets a pair. */
+static batten_status choose_bearers(batten_context *ctx, const surface_data *d, const double *normals,
+                                    unsigned char *bearer) {
+  memset(bearer, d->count <= PAIRS_EVERYWHERE, d->count);
+  if (d->count <= PAIRS_EVERYWHERE) return BATTEN_OK;
+  size_t *order = batten_alloc_array(ctx, d->count, sizeof *order);
+  if (!order) return BATTEN_E_NOMEM;
+  batten_tree_order(d->tree, order);
+  for (size_t low = 0; low < d->count; low += TOGETHER) {
+    const double *first = normals + order[low] * d->n;
+    bearer[order[low]] = 1;
+    for (size_t q = low + 1; q < low + TOGETHER && q < d->count; q++) {
+      const double *v = normals + order[q] * d->n;
+      double along = 0;
+      for (unsigned k = 0; k < d->n; k++) along += first[k] * v[k];
+      if (along >= 0) continue;
+      bearer[order[q]] = 1;
+      break;
+    }
+  }
+  batten_free(ctx, order);
+  return BATTEN_OK;
+}
+
 /* Surface points and pairs with their heights, f over the slope. */
 static batten_status collect_pairs(batten_context *ctx, const surface_data *d, const double *normals,
-                                   double pair_distance, collection *c) {
+                                   const unsigned char *bearer, double pair_distance, collection *c) {
   add_surface(c, d);
   for (size_t i = 0; i < d->count; i++)
-    for (int side = 1; side >= -1; side -= 2) {
+    for (int side = 1; bearer[i] && side >= -1; side -= 2) {
       double x[3], h = place_pair(d, normals, i, side, pair_distance * d->spacing[i], x);
       if (h > 0) add(c, x, -side * h, d->smoothing ? d->smoothing[i] : 0);
     }
@@ -237,11 +266,13 @@ batten_status batten_solid_fit_pairs(batten_context *ctx, const surface_data *d,
   batten_spline *spline = NULL;
   double *of_carrier = NULL, slope = 1;
   size_t capacity;
-  batten_status st = BATTEN_E_NOMEM;
-  if (!batten_mul(d->count, 3, &capacity) || !batten_add(capacity, far_count(d->n), &capacity))
-    return batten_fail(ctx, BATTEN_E_TOO_LARGE, "count: %zu points with pairs; give fewer", d->count);
-  st = open_collection(ctx, d, capacity, &c);
-  if (st >= 0) st = collect_pairs(ctx, d, normals, opt->pair_distance, &c);
+  unsigned char *bearer = batten_alloc_array(ctx, d->count, 1);
+  batten_status st = bearer ? choose_bearers(ctx, d, normals, bearer) : BATTEN_E_NOMEM;
+  if (st < 0) goto done;
+  capacity = d->count;
+  for (size_t i = 0; i < d->count; i++) capacity += 2u * bearer[i]; /* far from overflow: the points are held */
+  st = open_collection(ctx, d, capacity + far_count(d->n), &c);
+  if (st >= 0) st = collect_pairs(ctx, d, normals, bearer, opt->pair_distance, &c);
   if (st >= 0) st = slope_of(ctx, carrier, d, &slope);
   if (st < 0) goto done;
   size_t first_far = c.count;
@@ -261,6 +292,7 @@ batten_status batten_solid_fit_pairs(batten_context *ctx, const surface_data *d,
   if (st >= 0) *value_range = range_of(c.count, c.values);
 done:
   batten_spline_free(spline);
+  batten_free(ctx, bearer);
   batten_free(ctx, of_carrier);
   close_collection(ctx, &c);
   return st;

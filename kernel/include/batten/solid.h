@@ -33,10 +33,11 @@ typedef enum batten_orientation {
 
 typedef enum batten_orient_data {
   BATTEN_ORIENT_DATA_AUTO = 0,  /* gradients up to 2000 points, and pairs where the check is then not clean or the
-                                   system too ill-conditioned; above that pairs alone */
+                                   system too ill-conditioned; above that, and with opt.noise, pairs alone */
   BATTEN_ORIENT_DATA_GRADIENTS, /* Hermite-Birkhoff refit, no carrier, with the lowest order from m on whose kernel
                                    has two derivatives to spare (from m = 2: r^3, r^4 ln r) */
-  BATTEN_ORIENT_DATA_PAIRS      /* refit with points off the surface, same kernel and carrier */
+  BATTEN_ORIENT_DATA_PAIRS      /* refit with points off the surface, same kernel and carrier: 2 for each point; above
+                                   50,000 points for one in 8, so 1.25 N unknowns, a little more on thin parts */
 } batten_orient_data;
 
 typedef enum batten_orient_method {
@@ -57,6 +58,8 @@ typedef enum batten_sign_state {
   BATTEN_SIGN_AMBIGUOUS  /* the check still finds something: status BATTEN_W_AMBIGUOUS */
 } batten_sign_state;
 
+#define BATTEN_NOISE_ESTIMATE (-1.0)
+
 typedef struct batten_solid_options {
   size_t struct_size;
   const batten_carrier *carrier; /* NULL = auto: batten_carrier_fit */
@@ -70,6 +73,12 @@ typedef struct batten_solid_options {
   batten_orient_data orient_data;
   batten_orient_method orient_method;
   size_t energy_points; /* least-energy orientation works on at most so many points. Default 1000. */
+  double noise;         /* standard deviation of the points' distance from the surface, caller's unit. Not 0: the
+                           smoothing is the one with which the root mean square of |f| / |grad f| at the points, each cut
+                           at 5 times the noise, is the noise to 5 % (discrepancy principle), at the cost of some 3 to 8
+                           fits, above 6000 points of a subset of 3000 and 1 to 4 of all; spline.smoothing must then be 0.
+                           BATTEN_NOISE_ESTIMATE (any negative number): estimated from what quadrics over local planes
+                           leave. Default 0: spline.smoothing as it is. */
   double pair_distance; /* off-surface distance over the local spacing, in (0, 1]. Default 0.5. */
   size_t check_cells;   /* cells of the sign check's grid along the longest side, 8 .. 1000. Default 40. */
   double reduce;        /* distance, caller's unit, >= 0: so few points become centres of the spline that the surface is
@@ -104,6 +113,9 @@ typedef struct batten_solid_info {
   double residual_max;       /* max |f(x_i)| / (max - min of the interpolated values; where a carrier runs through all
                                 points its own size in the box) */
   double distance_max;       /* max |f(x_i)| / |grad f(x_i)|, caller's unit */
+  double distance_rms;       /* root mean square of |f(x_i)| / |grad f(x_i)|, caller's unit */
+  double noise;              /* given or estimated, caller's unit; 0: none was asked for */
+  double smoothing;          /* of the spline that is returned, as in batten_spline_options */
   double spacing;            /* median distance to the nearest other point, caller's unit */
   batten_spline_info spline; /* of the fit that is returned */
   batten_spline_reduce_info reduced; /* of that fit; errors are distances at the points; 0 without opt.reduce */
@@ -193,11 +205,11 @@ typedef struct batten_orient_info {
  *           closed as a surface (|sum of area normal| / area) by more than 0.1, and where its matrix is singular.
  *
  * Planes go through 10 (4) neighbours, above energy_points through up to 160 where noise makes these no plane: noise
- * of one spacing of the points is well. Points far off the surface turn nothing. Outward: extreme points look away
- * from the rest (PLANES, and ENERGY up to energy_points). Points that coincide get the same normal from ENERGY. The
- * result does not depend on the order of the points, up to ties in distance, nor on the context's threads; with other
- * threads of BLAS it differs by rounding. Progress phase "orient". opt NULL: defaults; info may be NULL. Fails:
- * INVALID, NOMEM, TOO_LARGE, SINGULAR (all on one line or plane), CANCELLED. */
+ * of one spacing of the of one spacing of the points is well. Points far off the surface turn nothing. Outward:
+ * extreme points look away from the rest (PLANES, and ENERGY up to energy_points). Points that coincide get the same
+ * normal from ENERGY. The result does not depend on the order of the points, up to ties in distance, nor on the
+ * context's threads; with other threads of BLAS it differs by rounding. Progress phase "orient". opt NULL: defaults;
+ * info may be NULL. Fails: INVALID, NOMEM, TOO_LARGE, SINGULAR (all on one line or plane), CANCELLED. */
 BATTEN_API batten_status batten_orient_points(batten_context *ctx, unsigned n, size_t count, const double *points,
                                               const batten_orient_options *opt, double *normals,
                                               batten_orient_info *info);
