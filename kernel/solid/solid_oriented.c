@@ -13,6 +13,7 @@
 #include <string.h>
 
 #include "base/checked.h"
+#include "base/points.h"
 #include "solid/solid_inner.h"
 
 enum { HALVINGS = 3 };
@@ -130,30 +131,66 @@ done:
 
 /* ---- pairs --------------------------------------------------------------------------------------- */
 
-/* x = point i + h side normal with the longest h that keeps x nearest to its own point; 0 when there is none. */
-static double place_pair(const surface_data *d, const double *normals, size_t i, int side, double h, double *x) {
+/* x = point i + h side normal */
+static void pair_at(const surface_data *d, const double *normals, size_t i, int side, double h, double *x) {
+  for (unsigned k = 0; k < d->n; k++) x[k] = d->points[i * d->n + k] + side * h * normals[i * d->n + k];
+}
+
+/* The longest h, h / 2, ... that keeps the pair nearest to its own point; 0 when there is none. */
+static double place_pair(const surface_data *d, const double *normals, size_t i, int side, double h) {
   for (int halving = 0; halving <= HALVINGS; halving++, h /= 2) {
     size_t nearest;
-    double distance;
-    for (unsigned k = 0; k < d->n; k++) x[k] = d->points[i * d->n + k] + side * h * normals[i * d->n + k];
+    double distance, x[3];
+    pair_at(d, normals, i, side, h, x);
     batten_tree_nearest(d->tree, x, 1, SIZE_MAX, &nearest, &distance);
     if (nearest == i) return h;
   }
   return 0;
 }
 
+typedef struct pair_query {
+  const surface_data *data;
+  const double *normals;
+  double pair_distance;
+  double *heights; /* [count][2] outside, inside */
+} pair_query;
+
+static void place_pairs(void *arg, size_t i) {
+  const pair_query *q = arg;
+  const double h = q->pair_distance * q->data->spacing[i];
+  q->heights[2 * i] = place_pair(q->data, q->normals, i, 1, h);
+  q->heights[2 * i + 1] = place_pair(q->data, q->normals, i, -1, h);
+}
+
+typedef struct meeting_query {
+  const collection *c;
+  const batten_tree *tree;
+  size_t first;
+  unsigned char *gone; /* [count - first] whether somebody is near */
+} meeting_query;
+
+static double meeting_radius(const collection *c, size_t i) { return 0.1 * fabs(c->values[i]); }
+
+static void find_meeting(void *arg, size_t i) {
+  const meeting_query *q = arg;
+  const collection *c = q->c;
+  q->gone[i] = batten_tree_any_within(q->tree, c->points + (q->first + i) * c->n, meeting_radius(c, q->first + i), i);
+}
+
 /* Drops points off the surface, from `first` on, that come nearer to an earlier one than a tenth of their height:
- * both sides of something thin meet in its middle. */
+ * both sides of something thin meet in its middle. Nearly all meet nobody, which is found by tasks. */
 static batten_status drop_meeting(batten_context *ctx, collection *c, size_t first) {
   size_t n = c->n, count = c->count - first, kept = first;
   batten_tree *tree = NULL;
   size_t *near = batten_alloc_array(ctx, count, sizeof *near);
   unsigned char *gone = batten_alloc_array(ctx, count, 1);
   batten_status st = near && gone ? batten_tree_new(ctx, c->n, count, c->points + first * n, &tree) : BATTEN_E_NOMEM;
+  meeting_query q = {c, tree, first, gone};
+  if (st >= 0) st = batten_for_points(ctx, "pairs", count, find_meeting, &q);
   if (st < 0) goto done;
   for (size_t i = 0; i < count; i++) {
-    const double *x = c->points + (first + i) * n;
-    size_t found = batten_tree_within(tree, x, 0.1 * fabs(c->values[first + i]), near);
+    if (!gone[i]) continue;
+    size_t found = batten_tree_within(tree, c->points + (first + i) * n, meeting_radius(c, first + i), near);
     gone[i] = 0;
     for (size_t j = 0; j < found; j++) gone[i] = gone[i] || (near[j] < i && !gone[near[j]]);
   }
@@ -231,13 +268,19 @@ static batten_status choose_bearers(batten_context *ctx, const surface_data *d, 
 /* Surface points and pairs with their heights, f over the slope. */
 static batten_status collect_pairs(batten_context *ctx, const surface_data *d, const double *normals,
                                    const unsigned char *bearer, double pair_distance, collection *c) {
+  double *heights = batten_alloc_array(ctx, d->count, 2 * sizeof *heights);
+  pair_query q = {d, normals, pair_distance, heights};
+  batten_status st = heights ? batten_for_points(ctx, "pairs", d->count, place_pairs, &q) : BATTEN_E_NOMEM;
   add_surface(c, d);
-  for (size_t i = 0; i < d->count; i++)
+  for (size_t i = 0; st >= 0 && i < d->count; i++)
     for (int side = 1; bearer[i] && side >= -1; side -= 2) {
-      double x[3], h = place_pair(d, normals, i, side, pair_distance * d->spacing[i], x);
-      if (h > 0) add(c, x, -side * h, d->smoothing ? d->smoothing[i] : 0);
+      double x[3], h = heights[2 * i + (side < 0)];
+      if (!(h > 0)) continue;
+      pair_at(d, normals, i, side, h, x);
+      add(c, x, -side * h, d->smoothing ? d->smoothing[i] : 0);
     }
-  return drop_meeting(ctx, c, d->count);
+  batten_free(ctx, heights);
+  return st < 0 ? st : drop_meeting(ctx, c, d->count);
 }
 
 /* Turns the heights of f into the values of U = f_c - slope f. Far points, from first_far on, stay only where the

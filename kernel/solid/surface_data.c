@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "base/checked.h"
+#include "base/points.h"
 #include "basis/eigen3.h"
 #include "solid/solid_inner.h"
 
@@ -37,25 +38,40 @@ static void measure_box(surface_data *d, size_t count, const double *points) {
   d->radius = sqrt(square);
 }
 
-/* kept[0 .. *kept_count): increasing indices of the points that stay. */
+typedef struct crowd_query {
+  const batten_tree *tree;
+  const double *points;
+  unsigned n;
+  double radius;
+  unsigned char *crowded; /* [count] */
+} crowd_query;
+
+static void find_crowded(void *arg, size_t i) {
+  const crowd_query *q = arg;
+  q->crowded[i] = batten_tree_any_within(q->tree, q->points + i * q->n, q->radius, i);
+}
+
+/* kept[0 .. *kept_count): increasing indices of the points that stay. *whole: the tree of all points, which is the
+ * caller's. Nearly all points are alone, which is found by tasks; who of the others stays depends on those before. */
 static batten_status merge(batten_context *ctx, unsigned n, size_t count, const double *points, double radius,
-                           size_t *kept, size_t *kept_count) {
-  batten_tree *tree = NULL;
-  unsigned char *gone = batten_alloc_array(ctx, count, 1);
+                           size_t *kept, size_t *kept_count, batten_tree **whole) {
+  enum { ALONE, CROWDED, GONE };
+  unsigned char *state = batten_alloc_array(ctx, count, 1);
   size_t *near = batten_alloc_array(ctx, count, sizeof *near);
-  batten_status st = gone && near ? batten_tree_new(ctx, n, count, points, &tree) : BATTEN_E_NOMEM;
+  batten_status st = state && near ? batten_tree_new(ctx, n, count, points, whole) : BATTEN_E_NOMEM;
+  crowd_query q = {.tree = *whole, .points = points, .n = n, .radius = radius, .crowded = state};
+  if (st >= 0) st = batten_for_points(ctx, "merge", count, find_crowded, &q);
   if (st < 0) goto done;
-  memset(gone, 0, count);
   *kept_count = 0;
   for (size_t i = 0; i < count; i++) {
-    if (gone[i]) continue;
+    if (state[i] == GONE) continue;
     kept[(*kept_count)++] = i;
-    size_t found = batten_tree_within(tree, points + i * n, radius, near);
-    for (size_t j = 0; j < found; j++) gone[near[j]] = 1;
+    if (state[i] == ALONE) continue;
+    size_t found = batten_tree_within(*whole, points + i * n, radius, near);
+    for (size_t j = 0; j < found; j++) state[near[j]] = GONE;
   }
 done:
-  batten_tree_free(ctx, tree);
-  batten_free(ctx, gone);
+  batten_free(ctx, state);
   batten_free(ctx, near);
   return st;
 }
@@ -145,26 +161,36 @@ static const double LINE_GAP = 0.5;
 /* Where lines cross, the points of the crossing know of no gap: they learn it from neighbours of neighbours. */
 enum { ROUNDS = 3 };
 
+typedef struct gap_query {
+  const surface_data *data;
+  size_t k;
+  const size_t *index; /* [count][k] nearest points */
+  double *own;         /* [count] */
+} gap_query;
+
+static void measure_own_gap(void *arg, size_t i) {
+  const gap_query *q = arg;
+  const surface_data *d = q->data;
+  const bool lines = d->n == 3 && q->k == NEIGHBOURS;
+  size_t near[NEIGHBOURS_MAX];
+  double distance[NEIGHBOURS_MAX];
+  q->own[i] = d->n == 2 ? gap_of_contour(d, i, near, distance)
+              : lines   ? gap_of_lines(d, i, q->index + i * q->k, near, distance)
+                        : 0;
+}
+
 /* gap: how far the surface may be expected to go on without data. In space the spacing, or what is left
  * free between lines about a point. */
 static batten_status measure_gaps(batten_context *ctx, surface_data *d, size_t k, const size_t *index) {
-  size_t *near = batten_alloc_array(ctx, NEIGHBOURS_MAX, sizeof *near);
-  double *distance = batten_alloc_array(ctx, NEIGHBOURS_MAX, sizeof *distance);
   double *own = batten_alloc_array(ctx, d->count, sizeof *own);
-  batten_status st = near && distance && own ? BATTEN_OK : BATTEN_E_NOMEM;
+  batten_status st = own ? BATTEN_OK : BATTEN_E_NOMEM;
+  gap_query q = {.data = d, .k = k, .index = index, .own = own};
+  if (st >= 0) st = batten_for_points(ctx, "gaps", d->count, measure_own_gap, &q);
   if (st < 0) goto done;
-  for (size_t i = 0; i < d->count; i++) {
-    bool lines = d->n == 3 && k == NEIGHBOURS;
-    own[i] = d->n == 2 ? gap_of_contour(d, i, near, distance)
-             : lines   ? gap_of_lines(d, i, index + i * k, near, distance)
-                       : 0;
-  }
   for (size_t i = 0; i < d->count; i++) d->in_lines += d->n == 3 && own[i] > 3 * d->spacing[i];
   for (unsigned round = 0; d->n == 3 && round < ROUNDS; round++) spread(d->count, k, index, own, d->gap);
   for (size_t i = 0; i < d->count; i++) d->gap[i] = fmax(d->spacing[i], (d->n == 3 ? LINE_GAP : 1) * own[i]);
 done:
-  batten_free(ctx, near);
-  batten_free(ctx, distance);
   batten_free(ctx, own);
   return st;
 }
@@ -179,7 +205,7 @@ static batten_status measure_spacing(batten_context *ctx, surface_data *d) {
   d->spacing = batten_alloc_array(ctx, count, sizeof(double));
   d->gap = batten_alloc_array(ctx, count, sizeof(double));
   batten_status st = index && distance && nearest && d->spacing && d->gap ? BATTEN_OK : BATTEN_E_NOMEM;
-  if (st >= 0) st = batten_neighbours(ctx, d->n, count, d->points, k, index, distance);
+  if (st >= 0) st = batten_tree_neighbours(ctx, d->tree, k, index, distance);
   if (st < 0) goto done;
   for (size_t i = 0; i < count; i++) {
     double sum = 0;
@@ -218,8 +244,12 @@ batten_status batten_surface_data_make(batten_context *ctx, unsigned n, size_t c
     st = batten_fail(ctx, BATTEN_E_INVALID, "points: a box of half diagonal %g; scale them down", d.radius);
     goto done;
   }
-  st = merge(ctx, n, count, points, fmax(opt->merge_radius, SAME * 2 * d.radius), kept, &d.count);
+  st = merge(ctx, n, count, points, fmax(opt->merge_radius, SAME * 2 * d.radius), kept, &d.count, &d.tree);
   if (st < 0) goto done;
+  if (d.count < count) { /* not the tree of those that stay */
+    batten_tree_free(ctx, d.tree);
+    d.tree = NULL;
+  }
   if (d.count < n + 1u) {
     st = batten_fail(ctx, BATTEN_E_INVALID,
                      "points: %zu, of them %zu distinct; at least %u are needed in %u dimensions", count, d.count,
@@ -237,7 +267,7 @@ batten_status batten_surface_data_make(batten_context *ctx, unsigned n, size_t c
   }
   measure_box(&d, d.count, d.points);
   st = opt->normals ? gather_normals(ctx, &d, kept, opt->normals) : BATTEN_OK;
-  if (st >= 0) st = batten_tree_new(ctx, n, d.count, d.points, &d.tree);
+  if (st >= 0 && !d.tree) st = batten_tree_new(ctx, n, d.count, d.points, &d.tree);
   if (st >= 0) st = measure_spacing(ctx, &d);
 done:
   batten_free(ctx, kept);

@@ -2,6 +2,8 @@
 #include "spline/inner.h"
 
 #include "base/checked.h"
+#include "base/neighbours.h"
+#include "base/points.h"
 #include "basis/eigen3.h"
 #include "basis/green.h"
 
@@ -120,7 +122,45 @@ static void sort_points(const spline_system *s, size_t *order) {
   }
 }
 
+typedef struct twin_query {
+  const batten_tree *tree;
+  const double *points;
+  unsigned n;
+  unsigned char *twin; /* [count] */
+} twin_query;
+
+static void find_twin(void *arg, size_t i) {
+  const twin_query *q = arg;
+  q->twin[i] = batten_tree_any_within(q->tree, q->points + i * q->n, 0, i);
+}
+
+/* Whether some points may be equal: found by tasks, where sorting would take the host's time. */
+static batten_status look_for_twins(batten_context *ctx, const spline_system *s, bool *found) {
+  batten_tree *tree = NULL;
+  double *points = batten_alloc_array(ctx, s->count, s->n * sizeof *points);
+  unsigned char *twin = batten_alloc_array(ctx, s->count, 1);
+  batten_status st = points && twin ? BATTEN_OK : BATTEN_E_NOMEM;
+  for (size_t i = 0; st >= 0 && i < s->count; i++)
+    for (unsigned a = 0; a < s->n; a++) points[i * s->n + a] = s->y[a][i];
+  if (st >= 0) st = batten_tree_new(ctx, s->n, s->count, points, &tree);
+  twin_query q = {tree, points, s->n, twin};
+  if (st >= 0) st = batten_for_points(ctx, "points", s->count, find_twin, &q);
+  *found = false;
+  for (size_t i = 0; st >= 0 && i < s->count; i++) *found = *found || twin[i];
+  batten_tree_free(ctx, tree);
+  batten_free(ctx, twin);
+  batten_free(ctx, points);
+  return st;
+}
+
+enum { SORTED = 20000 }; /* points that are sorted at once */
+
 static batten_status check_distinct(batten_context *ctx, const spline_system *s) {
+  if (s->count > SORTED) {
+    bool found;
+    batten_status st = look_for_twins(ctx, s, &found);
+    if (st < 0 || !found) return st;
+  }
   size_t *order = batten_alloc_array(ctx, s->count, sizeof *order);
   if (!order) return BATTEN_E_NOMEM;
   sort_points(s, order);

@@ -61,23 +61,57 @@ static void find_contents(const spline_terms *t, const size_t *order, spline_clu
   c->moments[3] = rest * (1 + rounding);
 }
 
-/* nodes [count] from the terms in their order. */
-static void fill(const spline_terms *t, const size_t *order, size_t count, spline_cluster *nodes) {
+/* Which terms the nodes [count] have. */
+static void divide(const spline_terms *t, size_t count, spline_cluster *nodes) {
   nodes[0].low = 0;
   nodes[0].high = t->plain + t->hermite;
-  for (size_t i = 0; i < count; i++) {
+  for (size_t i = 0; 2 * i + 2 < count; i++) {
     size_t low = nodes[i].low, high = nodes[i].high, middle = low + (high - low) / 2;
     /* Where a leaf's place has children, these hold nothing and nobody goes there. */
     if (spline_cluster_is_leaf(nodes + i)) middle = low = high;
-    if (2 * i + 2 < count) {
-      nodes[2 * i + 1].low = low;
-      nodes[2 * i + 1].high = nodes[2 * i + 2].low = middle;
-      nodes[2 * i + 2].high = high;
-    }
-    if (nodes[i].low == nodes[i].high) continue;
-    find_box(t, order, nodes + i);
-    find_contents(t, order, nodes + i);
+    nodes[2 * i + 1].low = low;
+    nodes[2 * i + 1].high = nodes[2 * i + 2].low = middle;
+    nodes[2 * i + 2].high = high;
   }
+}
+
+/* Nodes of a level, so many to a task. */
+typedef struct filling {
+  const spline_terms *terms;
+  const size_t *order;
+  spline_cluster *nodes;
+  size_t first, last, each;
+} filling;
+
+static void fill_nodes(void *arg, size_t task) {
+  const filling *f = arg;
+  const size_t first = f->first + task * f->each;
+  for (size_t i = first; i < first + f->each && i < f->last; i++) {
+    if (f->nodes[i].low == f->nodes[i].high) continue;
+    find_box(f->terms, f->order, f->nodes + i);
+    find_contents(f->terms, f->order, f->nodes + i);
+  }
+}
+
+enum {
+  TASKS = 512,      /* of a level at most */
+  LASTING = 1 << 16 /* terms from which on a level takes time to tell of */
+};
+
+/* nodes [count] from the terms in their order. Each level looks at all terms once. */
+static batten_status fill(batten_context *ctx, const spline_terms *t, const size_t *order, size_t count,
+                          spline_cluster *nodes) {
+  filling f = {.terms = t, .order = order, .nodes = nodes};
+  divide(t, count, nodes);
+  for (size_t level = 1; f.first < count; level *= 2, f.first = f.last) {
+    batten_status st =
+        nodes[0].high < LASTING ? BATTEN_OK : batten_progress(ctx, "clusters", (double)f.first / (double)count);
+    if (st < 0) return st;
+    f.last = f.first + level;
+    f.each = (level + TASKS - 1) / TASKS;
+    batten_parallel(ctx, (level + f.each - 1) / f.each, fill_nodes, &f);
+  }
+  return BATTEN_OK;
 }
 
 batten_status batten_spline_clusters_new(batten_context *ctx, const spline_terms *terms, spline_clusters *out) {
@@ -96,7 +130,8 @@ batten_status batten_spline_clusters_new(batten_context *ctx, const spline_terms
   st = batten_tree_new(ctx, terms->n, count, points, &tree);
   if (st < 0) goto done;
   batten_tree_order(tree, made.order);
-  fill(terms, made.order, nodes, made.nodes);
+  st = fill(ctx, terms, made.order, nodes, made.nodes);
+  if (st < 0) goto done;
   *out = made;
   made = (spline_clusters){NULL, NULL};
 done:

@@ -11,6 +11,7 @@
 #include <string.h>
 
 #include "base/checked.h"
+#include "base/points.h"
 
 enum { LEAF = 8, DEPTH = 64, AXES = 3 };
 
@@ -87,24 +88,75 @@ static unsigned widest_axis(const double *points, unsigned n, const size_t *orde
   return best;
 }
 
-static void build(batten_tree *t, const double *points) {
+/* A tree that is being built, and its nodes of one level. */
+typedef struct building {
+  batten_tree *tree;
+  const double *points;
+  range *nodes;
+} building;
+
+/* Splits a node; false where it is a leaf: *mid stays. */
+static bool split(const building *b, range r, size_t *mid) {
+  batten_tree *t = b->tree;
+  if (r.high - r.low <= LEAF) return false;
+  *mid = r.low + (r.high - r.low) / 2;
+  unsigned axis = widest_axis(b->points, t->n, t->index, r.low, r.high);
+  select_middle(b->points, t->n, axis, t->index, r.low, r.high, *mid);
+  t->axis[*mid] = (unsigned char)axis;
+  t->split[*mid] = b->points[t->index[*mid] * t->n + axis];
+  return true;
+}
+
+/* Splits one node of a level: its halves take the places 2 i and 2 i + 1 of the next. */
+static void split_node(void *arg, size_t i) {
+  const building *b = arg;
+  range r = b->nodes[i];
+  size_t mid = r.high; /* of a leaf, which has no right half */
+  split(b, r, &mid);
+  b->nodes[i] = (range){r.low, mid};
+}
+
+/* Everything below a node. */
+static void split_below(void *arg, size_t i) {
+  const building *b = arg;
   range stack[DEPTH];
-  size_t top = 0;
-  stack[top++] = (range){0, t->count};
-  for (size_t i = 0; i < t->count; i++) t->index[i] = i;
+  size_t top = 0, mid;
+  stack[top++] = b->nodes[i];
   while (top > 0) {
     range r = stack[--top];
-    if (r.high - r.low <= LEAF) continue;
-    size_t mid = r.low + (r.high - r.low) / 2;
-    unsigned axis = widest_axis(points, t->n, t->index, r.low, r.high);
-    select_middle(points, t->n, axis, t->index, r.low, r.high, mid);
-    t->axis[mid] = (unsigned char)axis;
-    t->split[mid] = points[t->index[mid] * t->n + axis];
+    if (!split(b, r, &mid)) continue;
     stack[top++] = (range){r.low, mid};
     stack[top++] = (range){mid, r.high};
   }
-  for (size_t i = 0; i < t->count; i++)
-    memcpy(t->points + i * t->n, points + t->index[i] * t->n, t->n * sizeof(double));
+  for (size_t j = b->nodes[i].low; j < b->nodes[i].high; j++)
+    memcpy(b->tree->points + j * b->tree->n, b->points + b->tree->index[j] * b->tree->n, b->tree->n * sizeof(double));
+}
+
+enum { LEVELS_APART = 6 };          /* of 2^6 nodes each level is split by tasks, below them one task does it all */
+static const size_t SERIAL = 10000; /* points that are sooner split than given to threads */
+
+/* Who splits what changes nothing: a node is split by its own points alone. */
+static void build(batten_context *ctx, batten_tree *t, const double *points) {
+  range nodes[1 << LEVELS_APART];
+  building b = {t, points, nodes};
+  size_t count = 1;
+  for (size_t i = 0; i < t->count; i++) t->index[i] = i;
+  nodes[0] = (range){0, t->count};
+  if (t->count <= SERIAL) {
+    split_below(&b, 0);
+    return;
+  }
+  for (unsigned level = 0; level < LEVELS_APART; level++) {
+    range before[1 << LEVELS_APART];
+    memcpy(before, nodes, count * sizeof *nodes);
+    batten_parallel(ctx, count, split_node, &b);
+    for (size_t i = count; i-- > 0;) {
+      nodes[2 * i + 1] = (range){nodes[i].high, before[i].high};
+      nodes[2 * i] = nodes[i];
+    }
+    count *= 2;
+  }
+  batten_parallel(ctx, count, split_below, &b);
 }
 
 void batten_tree_order(const batten_tree *t, size_t *order) {
@@ -181,6 +233,21 @@ size_t batten_tree_within(const batten_tree *t, const double *x, double radius, 
   return found;
 }
 
+bool batten_tree_any_within(const batten_tree *t, const double *x, double radius, size_t skip) {
+  pending stack[DEPTH];
+  size_t top = 0;
+  const double reach = radius * radius;
+  if (t->count == 0) return false;
+  stack[top++] = (pending){0, t->count, 0};
+  while (top > 0) {
+    pending p = stack[--top];
+    range leaf = descend(t, x, (range){p.low, p.high}, reach, stack, &top);
+    for (size_t i = leaf.low; i < leaf.high; i++)
+      if (t->index[i] != skip && distance_squared(t, i, x) <= reach) return true;
+  }
+  return false;
+}
+
 void batten_tree_free(batten_context *ctx, batten_tree *tree) {
   if (!tree) return;
   batten_free(ctx, tree->points);
@@ -210,52 +277,50 @@ batten_status batten_tree_new(batten_context *ctx, unsigned n, size_t count, con
     batten_tree_free(ctx, t);
     return BATTEN_E_NOMEM;
   }
-  build(t, points);
+  build(ctx, t, points);
   *out = t;
   return BATTEN_OK;
 }
 
 /* ---- all points against all ---------------------------------------------------------------------- */
 
-enum { QUERIES_PER_TASK = 256 };
-
 typedef struct all_queries {
   const batten_tree *tree;
-  const double *points;
   size_t k;
   size_t *index;
   double *distance;
 } all_queries;
 
-static void query_block(void *arg, size_t block) {
+/* In the order of the tree: neighbours there look at the same nodes. */
+static void query(void *arg, size_t j) {
   const all_queries *q = arg;
-  size_t last = (block + 1) * QUERIES_PER_TASK;
-  if (last > q->tree->count) last = q->tree->count;
-  for (size_t i = block * QUERIES_PER_TASK; i < last; i++)
-    batten_tree_nearest(q->tree, q->points + i * q->tree->n, q->k, i, q->index + i * q->k, q->distance + i * q->k);
+  const batten_tree *t = q->tree;
+  const size_t i = t->index[j];
+  batten_tree_nearest(t, t->points + j * t->n, q->k, i, q->index + i * q->k, q->distance + i * q->k);
 }
 
-batten_status batten_neighbours(batten_context *ctx, unsigned n, size_t count, const double *points, size_t k,
-                                size_t *index, double *distance) {
+batten_status batten_tree_neighbours(batten_context *ctx, const batten_tree *tree, size_t k, size_t *index,
+                                     double *distance) {
+  const size_t count = tree->count;
   size_t numbers;
   if (count == 0) return BATTEN_OK;
   if (k >= count) return batten_fail(ctx, BATTEN_E_INVALID, "k: %zu neighbours of %zu points; give fewer", k, count);
   if (!batten_mul(count, k, &numbers)) return batten_fail(ctx, BATTEN_E_TOO_LARGE, "k: %zu; too many", k);
-  batten_tree *tree = NULL;
   double *own = NULL;
-  batten_status st = batten_tree_new(ctx, n, count, points, &tree);
-  if (st < 0) return st;
-  if (!distance) {
-    distance = own = batten_alloc_array(ctx, numbers, sizeof *own);
-    if (!own) {
-      st = BATTEN_E_NOMEM;
-      goto done;
-    }
-  }
-  all_queries q = {tree, points, k, index, distance};
-  batten_parallel(ctx, (count + QUERIES_PER_TASK - 1) / QUERIES_PER_TASK, query_block, &q);
-done:
+  if (!distance && !(distance = own = batten_alloc_array(ctx, numbers, sizeof *own))) return BATTEN_E_NOMEM;
+  all_queries q = {tree, k, index, distance};
+  batten_status st = batten_for_points(ctx, "neighbours", count, query, &q);
   batten_free(ctx, own);
+  return st;
+}
+
+batten_status batten_neighbours(batten_context *ctx, unsigned n, size_t count, const double *points, size_t k,
+                                size_t *index, double *distance) {
+  if (count == 0) return BATTEN_OK;
+  if (k >= count) return batten_fail(ctx, BATTEN_E_INVALID, "k: %zu neighbours of %zu points; give fewer", k, count);
+  batten_tree *tree = NULL;
+  batten_status st = batten_tree_new(ctx, n, count, points, &tree);
+  if (st >= 0) st = batten_tree_neighbours(ctx, tree, k, index, distance);
   batten_tree_free(ctx, tree);
   return st;
 }

@@ -7,6 +7,7 @@
 #define BATTEN_BASE_NEIGHBOURS_H
 
 #include <batten/base.h>
+#include <stdbool.h>
 
 typedef struct batten_tree batten_tree;
 
@@ -28,8 +29,16 @@ size_t batten_tree_nearest(const batten_tree *tree, const double *x, size_t k, s
  */
 size_t batten_tree_within(const batten_tree *tree, const double *x, double radius, size_t *index);
 
-/* The k nearest other points of every point: index [count][k], distance [count][k] (NULL = not wanted), nearest
- * first. Fails: INVALID (k >= count unless count = 0), TOO_LARGE, NOMEM. */
+/* Whether some point but number `skip` is within radius: stops at the first. */
+bool batten_tree_any_within(const batten_tree *tree, const double *x, double radius, size_t skip);
+
+/* The k nearest other points of every point of the tree: index [count][k], distance [count][k] (NULL = not wanted),
+ * nearest first. Many points are looked up piece by piece, with progress (phase "neighbours") between. Fails: INVALID
+ * (k >= count unless count = 0), TOO_LARGE, NOMEM, CANCELLED. */
+batten_status batten_tree_neighbours(batten_context *ctx, const batten_tree *tree, size_t k, size_t *index,
+                                     double *distance);
+
+/* The same for points [count][n] without a tree of theirs. */
 batten_status batten_neighbours(batten_context *ctx, unsigned n, size_t count, const double *points, size_t k,
                                 size_t *index, double *distance);
 

@@ -94,6 +94,55 @@ static void test_within(batten_context *ctx) {
   T_CHECK(wrong == 0, "balls hold as many as all pairs say");
 }
 
+/* Trees that are built by several tasks, and looked up in several pieces: the same from 1 and from 3 threads, and
+ * what all pairs say at some of the points. A hundred places hold 20 points each. */
+static void test_many(batten_context *ctx) {
+  enum { MANY = 70000, DOUBLES = 2000, NEAR = 4 };
+  batten_context *alone = t_context(NULL, NULL, 1);
+  double *x = malloc(3 * MANY * sizeof *x), *distance[2];
+  size_t *index[2], *order[2], wrong = 0, crowded = 0, expected = 0;
+  uint64_t seed = 9;
+  for (size_t i = 0; i < 3 * MANY; i++) x[i] = i < 3 * DOUBLES ? (double)(i / 3 % 100) : 100 * t_uniform(&seed);
+  for (int t = 0; t < 2; t++) {
+    batten_tree *tree = NULL;
+    index[t] = malloc(MANY * NEAR * sizeof **index);
+    order[t] = malloc(MANY * sizeof **order);
+    distance[t] = malloc(MANY * NEAR * sizeof **distance);
+    T_OK(batten_tree_new(t ? ctx : alone, 3, MANY, x, &tree), ctx);
+    batten_tree_order(tree, order[t]);
+    T_OK(batten_tree_neighbours(t ? ctx : alone, tree, NEAR, index[t], distance[t]), ctx);
+    for (size_t i = 0; t && i < MANY; i += 97) {
+      const bool near = batten_tree_any_within(tree, x + 3 * i, 0.5, i);
+      crowded += near;
+      expected += distance[t][i * NEAR] <= 0.5;
+    }
+    batten_tree_free(t ? ctx : alone, tree);
+  }
+  T_CHECK(!memcmp(index[0], index[1], MANY * NEAR * sizeof **index) &&
+              !memcmp(distance[0], distance[1], MANY * NEAR * sizeof **distance) &&
+              !memcmp(order[0], order[1], MANY * sizeof **order),
+          "%d points: the same tree and neighbours by 1 and 3 threads", (int)MANY);
+  for (size_t i = 0; i < MANY; i += 997) {
+    size_t nearer = 0;
+    const double last = distance[0][i * NEAR + NEAR - 1];
+    for (size_t j = 0; j < MANY; j++) {
+      double sum = 0;
+      for (size_t c = 0; c < 3; c++) sum += (x[3 * i + c] - x[3 * j + c]) * (x[3 * i + c] - x[3 * j + c]);
+      nearer += j != i && sqrt(sum) < last;
+    }
+    wrong += nearer >= NEAR;
+  }
+  T_CHECK(wrong == 0, "no point is nearer than they");
+  T_CHECK(crowded == expected && crowded > 20, "%zu of %zu have somebody within 0.5", crowded, expected);
+  for (int t = 0; t < 2; t++) {
+    free(index[t]);
+    free(order[t]);
+    free(distance[t]);
+  }
+  free(x);
+  batten_context_free(alone);
+}
+
 static batten_status call_neighbours(batten_context *ctx, void *arg) {
   size_t index[40];
   (void)arg;
@@ -105,6 +154,7 @@ int main(void) {
   test_by_hand(ctx);
   test_all_pairs(ctx);
   test_within(ctx);
+  test_many(ctx);
   size_t index[4];
   const double bad[4] = {0, 1, NAN, 2};
   T_STATUS(batten_neighbours(ctx, 4, 1, bad, 0, index, NULL), BATTEN_E_INVALID, ctx, "n: 4");
