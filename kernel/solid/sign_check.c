@@ -67,16 +67,60 @@ static int compare_doubles(const void *a, const void *b) {
 /* Step off the surface, in local spacings: outside the tip that r and r^2 ln r have at a centre, inside the shape. */
 static const double PROBE = 0.1;
 
+/* A point and its two probes. */
+typedef struct probes {
+  const surface_data *data;
+  const double *unit; /* [count][n] gradients of length 1, or 0 where they are under 1 % of the median */
+  double *x;          /* [count][2][n] */
+  double *at, *f;     /* [count] f at the points, [count][2] at the probes */
+} probes;
+
+static bool is_strong(const probes *p, size_t i) {
+  return dot(p->data->n, p->unit + i * p->data->n, p->unit + i * p->data->n) > 0;
+}
+
+/* at: 0 but for smoothing */
+static bool changes_sign(double at, const double *f) { return f[0] > at && f[1] < at; }
+
+/* Fast sums may be too coarse for points that nearly coincide, whose probes are as near: such that seem weak are
+ * summed directly, as long as these sums are few. */
+static batten_status sum_again(batten_context *ctx, const batten_solid *s, const batten_solid_evaluator *e,
+                               const probes *p) {
+  const size_t n = p->data->n, count = p->data->count;
+  size_t weak = 0, taken = 0;
+  if (batten_solid_evaluator_get_info(e).method == BATTEN_EVALUATE_DIRECT) return BATTEN_OK;
+  for (size_t i = 0; i < count; i++) weak += is_strong(p, i) && !changes_sign(p->at[i], p->f + 2 * i);
+  if (weak == 0 || weak > batten_solid_points_to_sum(s, count)) return BATTEN_OK;
+  double *x = batten_alloc_array(ctx, weak, 3 * (n + 1) * sizeof *x), *f = x ? x + 3 * n * weak : NULL;
+  size_t *which = batten_alloc_array(ctx, weak, sizeof *which);
+  batten_status st = x && which ? BATTEN_OK : BATTEN_E_NOMEM;
+  for (size_t i = 0; st >= 0 && i < count; i++) {
+    if (!is_strong(p, i) || changes_sign(p->at[i], p->f + 2 * i)) continue;
+    memcpy(x + 3 * n * taken, p->data->points + i * n, n * sizeof *x);
+    memcpy(x + 3 * n * taken + n, p->x + 2 * i * n, 2 * n * sizeof *x);
+    which[taken++] = i;
+  }
+  if (st >= 0) st = batten_solid_evaluate(ctx, s, 3 * weak, x, f, NULL, NULL);
+  for (size_t j = 0; st >= 0 && j < weak; j++) {
+    p->at[which[j]] = f[3 * j];
+    memcpy(p->f + 2 * which[j], f + 3 * j + 1, 2 * sizeof *f);
+  }
+  batten_free(ctx, which);
+  batten_free(ctx, x);
+  return st;
+}
+
 /* Unit gradients at the points, length 0 where they are weak: under 1 % of the median, or without a change of sign
  * along them. */
 static batten_status gradients_at_data(batten_context *ctx, const surface_data *d, const batten_solid *s,
-                                       double *unit, size_t *weak) {
+                                       batten_solid_evaluator *e, double *unit, size_t *weak) {
   size_t n = d->n, count = d->count;
   double *length = batten_alloc_array(ctx, count, 2 * sizeof *length), *sorted = length ? length + count : NULL;
-  double *probe = batten_alloc_array(ctx, count, 2 * n * sizeof *probe);
+  double *x = batten_alloc_array(ctx, count, 2 * n * sizeof *x);
   double *f = batten_alloc_array(ctx, count, 3 * sizeof *f), *at = f ? f + 2 * count : NULL;
-  batten_status st = length && probe && f ? BATTEN_OK : BATTEN_E_NOMEM;
-  if (st >= 0) st = batten_solid_evaluate(ctx, s, count, d->points, at, unit, NULL);
+  probes p = {d, unit, x, at, f};
+  batten_status st = length && x && f ? BATTEN_OK : BATTEN_E_NOMEM;
+  if (st >= 0) st = batten_solid_evaluator_evaluate(ctx, e, count, d->points, at, unit);
   if (st < 0) goto done;
   for (size_t i = 0; i < count; i++) sorted[i] = length[i] = sqrt(dot(n, unit + i * n, unit + i * n));
   qsort(sorted, count, sizeof *sorted, compare_doubles);
@@ -84,23 +128,24 @@ static batten_status gradients_at_data(batten_context *ctx, const surface_data *
   for (size_t i = 0; i < count; i++) {
     bool strong = length[i] > least;
     for (size_t k = 0; k < n; k++) {
-      double e = strong ? unit[i * n + k] / length[i] : 0, x = d->points[i * n + k], h = PROBE * d->spacing[i];
-      unit[i * n + k] = e;
-      probe[2 * i * n + k] = x + h * e;
-      probe[(2 * i + 1) * n + k] = x - h * e;
+      double u = strong ? unit[i * n + k] / length[i] : 0, y = d->points[i * n + k], h = PROBE * d->spacing[i];
+      unit[i * n + k] = u;
+      x[2 * i * n + k] = y + h * u;
+      x[(2 * i + 1) * n + k] = y - h * u;
     }
   }
-  st = batten_solid_evaluate(ctx, s, 2 * count, probe, f, NULL, NULL);
+  st = batten_solid_evaluator_evaluate(ctx, e, 2 * count, x, f, NULL);
+  if (st >= 0) st = sum_again(ctx, s, e, &p);
   if (st < 0) goto done;
   *weak = 0;
   for (size_t i = 0; i < count; i++) {
-    if (length[i] > least && f[2 * i] > at[i] && f[2 * i + 1] < at[i]) continue; /* at: 0 but for smoothing */
+    if (is_strong(&p, i) && changes_sign(at[i], f + 2 * i)) continue;
     (*weak)++;
     for (size_t k = 0; k < n; k++) unit[i * n + k] = 0;
   }
 done:
   batten_free(ctx, length);
-  batten_free(ctx, probe);
+  batten_free(ctx, x);
   batten_free(ctx, f);
   return st;
 }
@@ -128,15 +173,15 @@ static size_t count_flipped(const surface_data *d, size_t k, const size_t *index
 }
 
 static batten_status check_data(batten_context *ctx, const surface_data *d, const batten_solid *s,
-                                batten_sign_check *out) {
+                                batten_solid_evaluator *e, batten_sign_check *out) {
   size_t k = d->n == 3 ? NEIGHBOURS : 2;
   if (k > d->count - 1) k = d->count - 1;
   double *unit = batten_alloc_array(ctx, d->count, d->n * sizeof *unit);
   size_t *index = batten_alloc_array(ctx, d->count, k * sizeof *index);
   double *distance = batten_alloc_array(ctx, d->count, k * sizeof *distance);
   batten_status st = unit && index && distance ? BATTEN_OK : BATTEN_E_NOMEM;
-  if (st >= 0) st = gradients_at_data(ctx, d, s, unit, &out->weak_gradients);
-  if (st >= 0) st = batten_neighbours(ctx, d->n, d->count, d->points, k, index, distance);
+  if (st >= 0) st = gradients_at_data(ctx, d, s, e, unit, &out->weak_gradients);
+  if (st >= 0) st = batten_tree_neighbours(ctx, d->tree, k, index, distance);
   if (st >= 0) out->flipped_neighbours = count_flipped(d, k, index, distance, unit);
   batten_free(ctx, unit);
   batten_free(ctx, index);
@@ -188,7 +233,7 @@ static void node_place(const check_grid *g, size_t node, double shift, double *x
 }
 
 /* Signs at all nodes, a few thousand at a time so that the host can cancel. */
-static batten_status fill_signs(batten_context *ctx, const batten_solid *s, check_grid *g) {
+static batten_status fill_signs(batten_context *ctx, batten_solid_evaluator *e, check_grid *g) {
   enum { BATCH = 8192 };
   size_t n = g->n;
   double *x = batten_alloc_array(ctx, BATCH, n * sizeof *x), *f = batten_alloc_array(ctx, BATCH, sizeof *f);
@@ -197,7 +242,7 @@ static batten_status fill_signs(batten_context *ctx, const batten_solid *s, chec
     size_t now = g->total - first < BATCH ? g->total - first : BATCH;
     for (size_t i = 0; i < now; i++) node_place(g, first + i, 0, x + i * n);
     st = batten_progress(ctx, "sign check", (double)first / (double)g->total);
-    if (st >= 0) st = batten_solid_evaluate(ctx, s, now, x, f, NULL, NULL);
+    if (st >= 0) st = batten_solid_evaluator_evaluate(ctx, e, now, x, f, NULL);
     for (size_t i = 0; st >= 0 && i < now; i++) g->inside[first + i] = f[i] >= 0;
   }
   batten_free(ctx, x);
@@ -312,14 +357,14 @@ static void count_phantoms(const check_grid *g, const surface_data *d, const cel
   for (size_t p = 0; p < pieces; p++) out->phantom_components += lonely[p];
 }
 
-static batten_status check_between(batten_context *ctx, const surface_data *d, size_t cells, const batten_solid *s,
-                                   size_t *crossed_cells, batten_sign_check *out) {
+static batten_status check_between(batten_context *ctx, const surface_data *d, size_t cells,
+                                   batten_solid_evaluator *e, size_t *crossed_cells, batten_sign_check *out) {
   check_grid g = {0};
   size_t *list = NULL;
   double *excess = NULL;
   unsigned char *lonely = NULL;
   batten_status st = lay_grid(ctx, d, cells, &g);
-  if (st >= 0) st = fill_signs(ctx, s, &g);
+  if (st >= 0) st = fill_signs(ctx, e, &g);
   if (st < 0) goto done;
   size_t crossed = *crossed_cells = mark_crossed(&g);
   st = BATTEN_E_NOMEM;
@@ -346,7 +391,7 @@ done:
 static const double STRAY_CELLS = 0.002;
 
 batten_status batten_solid_check_sign(batten_context *ctx, const surface_data *d, size_t cells, int may_turn,
-                                      batten_solid *s, batten_sign_check *out) {
+                                      batten_solid *s, batten_solid_evaluator *e, batten_sign_check *out) {
   batten_sign_check check = {0};
   size_t positive[SHELLS], crossed = 0;
   batten_status st = look_far(ctx, d, s, positive);
@@ -356,8 +401,8 @@ batten_status batten_solid_check_sign(batten_context *ctx, const surface_data *d
     check.inside_out = 1;
     for (size_t i = 0; i < SHELLS; i++) positive[i] = DIRECTIONS - positive[i];
   }
-  if (d->n > 1) st = check_data(ctx, d, s, &check);
-  if (st >= 0 && d->n > 1) st = check_between(ctx, d, cells, s, &crossed, &check);
+  if (d->n > 1) st = check_data(ctx, d, s, e, &check);
+  if (st >= 0 && d->n > 1) st = check_between(ctx, d, cells, e, &crossed, &check);
   if (st < 0) return st;
   /* A sheet that nobody asked for takes many cells; a few are where samples happen to lie far apart. */
   bool few = (double)check.phantom_cells <= STRAY_CELLS * (double)crossed, bounded = true;

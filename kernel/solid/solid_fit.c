@@ -24,6 +24,7 @@ typedef struct attempt {
   double value_range, smoothing;
   batten_orient_data data; /* AUTO: the carrier alone */
   batten_sign_check check;
+  batten_solid_evaluator_info evaluation; /* of the check */
 } attempt;
 
 typedef struct fit_state {
@@ -53,6 +54,7 @@ static batten_status check_options(batten_context *ctx, unsigned n, const batten
   if (st >= 0) st = batten_check_struct(ctx, "batten_spline_options", o->spline.struct_size, sizeof o->spline);
   if (st >= 0) st = check_enum(ctx, "orientation", (int)o->orientation, BATTEN_ORIENT_ESTIMATE);
   if (st >= 0) st = check_enum(ctx, "orient_data", (int)o->orient_data, BATTEN_ORIENT_DATA_PAIRS);
+  if (st >= 0) st = check_enum(ctx, "evaluation", (int)o->evaluation, BATTEN_EVALUATE_FAST);
   if (st >= 0) st = check_enum(ctx, "orient_method", (int)o->orient_method, BATTEN_ORIENT_METHOD_PLANES);
   if (st < 0) return st;
   if (!(o->merge_radius >= 0) || !isfinite(o->merge_radius))
@@ -206,10 +208,22 @@ done:
   return st;
 }
 
+/* The check's probes lie a tenth of the spacing off the points: sums are a tenth of that fine. */
+static double check_accuracy(const surface_data *d) {
+  const double wanted = d->radius > 0 ? 0.01 * d->spacing_median / (2 * d->radius) : 0;
+  return fmax(fmin(wanted, 1e-5), 1e-10);
+}
+
 static batten_status check_attempt(fit_state *f, attempt *a) {
   double start = batten_now();
-  batten_status st = batten_solid_check_sign(f->ctx, &f->data, f->opt.check_cells, a->data == BATTEN_ORIENT_DATA_AUTO,
-                                             a->solid, &a->check);
+  batten_solid_evaluator *e = NULL;
+  batten_status st = batten_solid_evaluator_new(f->ctx, a->solid, f->opt.evaluation, check_accuracy(&f->data), &e);
+  st = batten_expect(f->ctx, st, BATTEN_W_ACCURACY); /* as good as the sums get: the info tells */
+  if (st >= 0)
+    st = batten_solid_check_sign(f->ctx, &f->data, f->opt.check_cells, a->data == BATTEN_ORIENT_DATA_AUTO, a->solid,
+                                 e, &a->check);
+  if (st >= 0) a->evaluation = batten_solid_evaluator_get_info(e);
+  batten_solid_evaluator_free(e);
   f->info.time_check_s += batten_now() - start;
   return st;
 }
@@ -392,21 +406,33 @@ static batten_status cure(fit_state *f) {
 
 /* ---- the report ---------------------------------------------------------------------------------- */
 
+size_t batten_solid_points_to_sum(const batten_solid *s, size_t count) {
+  enum { TERMS = 1000000000, LEAST = 1000 };
+  const size_t most = TERMS / batten_solid_term_count(s);
+  if (count <= most || count <= LEAST) return count;
+  return most > LEAST ? most : LEAST;
+}
+
+/* f at the points, of which many are evenly drawn: by direct sums, since what is looked for is smaller than fast ones
+ * are accurate. */
 static batten_status measure_residual(fit_state *f) {
   const surface_data *d = &f->data;
-  size_t n = d->n;
-  double *values = batten_alloc_array(f->ctx, d->count, (n + 1) * sizeof *values);
+  const size_t n = d->n, count = batten_solid_points_to_sum(f->best.solid, d->count);
+  double *values = batten_alloc_array(f->ctx, count, (2 * n + 1) * sizeof *values);
   if (!values) return BATTEN_E_NOMEM;
-  double *gradients = values + d->count;
-  batten_status st = batten_solid_evaluate(f->ctx, f->best.solid, d->count, d->points, values, gradients, NULL);
-  for (size_t i = 0; st >= 0 && i < d->count; i++) {
+  double *gradients = values + count, *points = gradients + count * n;
+  for (size_t q = 0; q < count; q++)
+    memcpy(points + q * n, d->points + batten_drawn(q, count, d->count) * n, n * sizeof *points);
+  batten_status st = batten_solid_evaluate(f->ctx, f->best.solid, count, points, values, gradients, NULL);
+  for (size_t i = 0; st >= 0 && i < count; i++) {
     double square = 0;
     for (size_t k = 0; k < n; k++) square += gradients[i * n + k] * gradients[i * n + k];
     f->info.residual_max = fmax(f->info.residual_max, fabs(values[i]) / f->best.value_range);
     if (values[i] != 0) f->info.distance_max = fmax(f->info.distance_max, fabs(values[i]) / sqrt(square));
-    if (values[i] != 0) f->info.distance_rms += values[i] * values[i] / square / (double)d->count;
+    if (values[i] != 0) f->info.distance_rms += values[i] * values[i] / square / (double)count;
   }
   f->info.distance_rms = sqrt(f->info.distance_rms);
+  f->info.residual_points = count;
   batten_free(f->ctx, values);
   return st;
 }
@@ -449,6 +475,7 @@ static batten_status finish(fit_state *f) {
   }
   info->orient_data = f->best.data;
   info->check_final = f->best.check;
+  info->evaluation = f->best.evaluation;
   info->spline = f->best.spline;
   info->reduced = f->best.reduced;
   info->smoothing = info->noise > 0 ? f->best.smoothing : f->opt.spline.smoothing;
@@ -509,9 +536,11 @@ batten_status batten_solid_fit(batten_context *ctx, unsigned n, size_t count, co
   if (st >= 0) st = check_options(ctx, n, &f.opt);
   if (st < 0) return st;
   f.carrier = share(f.opt.carrier);
+  double start = batten_now();
   st = batten_surface_data_make(ctx, n, count, points, &f.opt, &f.data);
   f.info.noise = fmax(f.opt.noise, 0);
   if (st >= 0 && f.opt.noise < 0 && n > 1) st = batten_solid_estimate_noise(ctx, &f.data, &f.info.noise);
+  f.info.time_data_s = batten_now() - start;
   if (st < 0) goto done;
   if (orientation_comes_first(&f)) {
     st = cure(&f);

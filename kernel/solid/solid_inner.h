@@ -47,9 +47,15 @@ batten_status batten_surface_data_make(batten_context *ctx, unsigned n, size_t c
                                        const batten_solid_options *opt, surface_data *out);
 void batten_surface_data_free(batten_context *ctx, surface_data *d);
 
-/* The check of the sign field. Where may_turn, a solid that is positive far away is turned inside out first. */
+/* The check of the sign field. Where may_turn, a solid that is positive far away is turned inside out first. e: of
+ * that solid, what values at many points are taken from. */
 batten_status batten_solid_check_sign(batten_context *ctx, const surface_data *d, size_t cells, int may_turn,
-                                      batten_solid *s, batten_sign_check *out);
+                                      batten_solid *s, batten_solid_evaluator *e, batten_sign_check *out);
+
+/* Terms of a solid's spline, N + n M; 0 of other kinds. */
+size_t batten_solid_term_count(const batten_solid *s);
+/* How many of a fit's points may be summed directly: 1e9 terms in all, 1000 points at least. */
+size_t batten_solid_points_to_sum(const batten_solid *s, size_t count);
 
 /* A solid through the points whose unit outward normals are data too: as gradients, without a carrier, or as pairs of
  * points off the surface. opt: the caller's. value_range: max - min of the interpolated values. */

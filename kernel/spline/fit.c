@@ -213,11 +213,6 @@ static batten_status solve(fit *t) {
 
 static bool is_iterative(const fit *t) { return t->info.saddle.method == BATTEN_SADDLE_ITERATIVE; }
 
-/* Number q of `samples` out of `count`, evenly drawn. */
-static size_t drawn(size_t q, size_t samples, size_t count) {
-  return q * (count / samples) + q * (count % samples) / samples;
-}
-
 /* ---- leave-one-out ---- */
 
 /* U_without_i(x_i) - v_i = -w_i / (inverse matrix)_ii  [Rippa 1999], with or without smoothing: the row and column
@@ -232,7 +227,7 @@ static batten_status leave_one_out(fit *t) {
   double *diagonal = batten_alloc_array(t->ctx, samples, sizeof *diagonal), largest = 0, sum = 0;
   size_t *index = batten_alloc_array(t->ctx, samples, sizeof *index), used = 0;
   if (!diagonal || !index) goto done;
-  for (size_t q = 0; q < samples; q++) index[q] = drawn(q, samples, count);
+  for (size_t q = 0; q < samples; q++) index[q] = batten_drawn(q, samples, count);
   st = batten_saddle_inverse_diagonal(t->ctx, t->saddle, samples, index, diagonal);
   if (st < 0) goto done;
   for (size_t q = 0; q < samples; q++) largest = fmax(largest, fabs(diagonal[q]));
@@ -315,14 +310,14 @@ static batten_status check_values(fit *t, double *worst) {
     some = batten_alloc_array(t->ctx, checked, n * sizeof *some);
     if (!some) return BATTEN_E_NOMEM;
     for (size_t q = 0; q < checked; q++)
-      memcpy(some + q * n, d->points + drawn(q, checked, d->count) * n, n * sizeof *some);
+      memcpy(some + q * n, d->points + batten_drawn(q, checked, d->count) * n, n * sizeof *some);
     points = some;
   }
   st = batten_spline_evaluate(t->ctx, t->spline, checked, points, values, NULL, NULL);
   batten_free(t->ctx, some);
   if (st < 0) return st;
   for (size_t q = 0; q < checked; q++) {
-    const size_t i = drawn(q, checked, d->count);
+    const size_t i = batten_drawn(q, checked, d->count);
     double miss = fabs(values[q] + smoothing_at(t, i) * t->w[i] - d->values[i]);
     if (!(miss <= *worst)) *worst = miss;
   }
@@ -337,13 +332,13 @@ static batten_status check_gradients(fit *t, double *worst) {
   const size_t n = d->n, count = d->gradient_count, checked = points_to_check(t, count);
   double *points = t->w, *gradients = t->f;
   for (size_t q = 0; q < checked; q++) {
-    const size_t g = drawn(q, checked, count), at = d->gradient_at ? d->gradient_at[g] : g;
+    const size_t g = batten_drawn(q, checked, count), at = d->gradient_at ? d->gradient_at[g] : g;
     memcpy(points + q * n, d->points + at * n, n * sizeof *points);
   }
   batten_status st = batten_spline_evaluate(t->ctx, t->spline, checked, points, NULL, gradients, NULL);
   if (st < 0) return st;
   for (size_t q = 0; q < checked; q++)
-    for (size_t a = 0; a < n; a++) gradients[q * n + a] -= d->gradients[drawn(q, checked, count) * n + a];
+    for (size_t a = 0; a < n; a++) gradients[q * n + a] -= d->gradients[batten_drawn(q, checked, count) * n + a];
   *worst = largest_length(n, checked, gradients);
   return BATTEN_OK;
 }

@@ -30,6 +30,11 @@ static inline size_t batten_first_nonfinite(size_t count, const double *values) 
   return i;
 }
 
+/* Number q of `samples` out of `count`, evenly drawn; samples <= count. */
+static inline size_t batten_drawn(size_t q, size_t samples, size_t count) {
+  return q * (count / samples) + q * (count % samples) / samples;
+}
+
 /* The power of two that brings |x| to [1, 2): multiplying by it is exact. x > 0 and finite; a subnormal x comes as
  * near to 1 as a double can bring it. */
 static inline double batten_unit(double x) {

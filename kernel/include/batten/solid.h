@@ -60,6 +60,15 @@ typedef enum batten_sign_state {
 
 #define BATTEN_NOISE_ESTIMATE (-1.0)
 
+/* How f is summed at many places. */
+typedef enum batten_evaluation {
+  BATTEN_EVALUATE_AUTO = 0, /* FAST from 12,000 terms N + nM on, 30,000 with kernels beyond r and r^2 ln r;
+                               DIRECT below */
+  BATTEN_EVALUATE_DIRECT,   /* N terms for each place, to rounding: batten_solid_evaluate */
+  BATTEN_EVALUATE_FAST      /* by batten_spline_evaluator, as accurate as asked for. Stacks, trees and solids of one
+                               dimension have no such sums and are evaluated directly all the same */
+} batten_evaluation;
+
 typedef struct batten_solid_options {
   size_t struct_size;
   const batten_carrier *carrier; /* NULL = auto: batten_carrier_fit */
@@ -81,9 +90,11 @@ typedef struct batten_solid_options {
                            leave. Default 0: spline.smoothing as it is. */
   double pair_distance; /* off-surface distance over the local spacing, in (0, 1]. Default 0.5. */
   size_t check_cells;   /* cells of the sign check's grid along the longest side, 8 .. 1000. Default 40. */
-  double reduce;        /* distance, caller's unit, >= 0: so few points become centres of the spline that the surface is
-                           within it of all, |f| / |grad f| <= reduce; batten_spline_fit_reduced(). Orientation then
-                           enters as pairs, of which half the height may be missed. 0: all points. Default 0. */
+  double reduce; /* distance, caller's unit, >= 0: so few points become centres of the spline that the surface is
+                    within it of all, |f| / |grad f| <= reduce; batten_spline_fit_reduced(). Orientation then
+                    enters as pairs, of which half the height may be missed. 0: all points. Default 0. */
+  batten_evaluation evaluation; /* how the sign check evaluates f. What is reported of residuals is always direct.
+                                   Default AUTO. */
   batten_spline_options spline;
 } batten_solid_options;
 BATTEN_API batten_solid_options batten_solid_options_default(void);
@@ -101,6 +112,22 @@ typedef struct batten_sign_check {
   int clean;                 /* none of these; phantom cells up to 0.2 % of the crossed ones do not count */
 } batten_sign_check;
 
+/* What an evaluator does, and how well. */
+typedef struct batten_solid_evaluator_info {
+  batten_evaluation method; /* DIRECT or FAST; with DIRECT the next four are 0 */
+  double error;          /* the largest |difference to direct f| / |grad f| at `places` over the diagonal of the box:
+                            how far the surface moves. Of millions of places the worst is up to three times that; in the box
+                            beside, where f is large, f is off by some times as much. A slope under 1 % of the median
+                            counts as 1 %, one off the surface as the median. */
+  double gradient_error; /* likewise of the gradients, |difference| / |grad f| */
+  double sums_accuracy;  /* what the fast sums were asked for, see batten_spline_evaluator_new() */
+  size_t places;         /* where f was summed directly too: up to 400 points of the surface, evenly drawn, and 112
+                            off it */
+  size_t terms;          /* N + nM, 0 of stacks and trees */
+  size_t evaluations;    /* points asked for so far */
+  double time_new_s, time_evaluate_s; /* making it, trials included; all evaluations so far */
+} batten_solid_evaluator_info;
+
 typedef struct batten_solid_info {
   size_t points_given, points_used, duplicates_merged;
   batten_sign_state sign;
@@ -110,15 +137,19 @@ typedef struct batten_solid_info {
   double orient_lambda;               /* smoothing at which the estimated orientation was settled */
   batten_sign_check check;            /* of the first fit */
   batten_sign_check check_final;      /* of the solid that is returned */
-  double residual_max;       /* max |f(x_i)| / (max - min of the interpolated values; where a carrier runs through all
-                                points its own size in the box) */
-  double distance_max;       /* max |f(x_i)| / |grad f(x_i)|, caller's unit */
-  double distance_rms;       /* root mean square of |f(x_i)| / |grad f(x_i)|, caller's unit */
-  double noise;              /* given or estimated, caller's unit; 0: none was asked for */
-  double smoothing;          /* of the spline that is returned, as in batten_spline_options */
-  double spacing;            /* median distance to the nearest other point, caller's unit */
-  batten_spline_info spline; /* of the fit that is returned */
-  batten_spline_reduce_info reduced; /* of that fit; errors are distances at the points; 0 without opt.reduce */
+  double residual_max;    /* max |f(x_i)| / (max - min of the interpolated values; where a carrier runs through all
+                             points its own size in the box) */
+  double distance_max;    /* max |f(x_i)| / |grad f(x_i)|, caller's unit */
+  double distance_rms;    /* root mean square of |f(x_i)| / |grad f(x_i)|, caller's unit */
+  double noise;           /* given or estimated, caller's unit; 0: none was asked for */
+  double smoothing;       /* of the spline that is returned, as in batten_spline_options */
+  size_t residual_points; /* at how many points these were looked for, by direct sums: all, or, where N times the
+                             terms of f are above 1e9, 1e9 / terms evenly drawn ones, and 1000 at least */
+  batten_solid_evaluator_info evaluation; /* of check_final's evaluations of f */
+  double spacing;                         /* median distance to the nearest other point, caller's unit */
+  batten_spline_info spline;              /* of the fit that is returned */
+  batten_spline_reduce_info reduced;      /* of that fit; errors are distances at the points; 0 without opt.reduce */
+  double time_data_s;                     /* merging, neighbours, spacing */
   double time_fit_s, time_check_s, time_orient_s;
 } batten_solid_info;
 
@@ -127,7 +158,8 @@ typedef struct batten_solid_info {
  * spline.saddle.residual_rows above opt.spline.saddle.accuracy; with opt.reduce, reduced.ratio_max above 1). Fails as
  * batten_spline_fit, and INVALID for a carrier that the spline reproduces (the text says which to take): every
  * carrier alone with m >= 3 needs orientation, and without a carrier of the caller's it is estimated at once. *out
- * untouched on failure; info may be NULL. The check costs (about 1.5 check_cells)^n evaluations of f. */
+ * untouched on failure; info may be NULL. The check costs (about 1.5 check_cells)^n evaluations of f on its grid and
+ * 3 N and N gradients at the points; with fast sums all takes time in proportion to N. */
 BATTEN_API batten_status batten_solid_fit(batten_context *ctx, unsigned n, size_t count, const double *points,
                                           const batten_solid_options *opt, batten_solid **out,
                                           batten_solid_info *info);
@@ -150,6 +182,30 @@ BATTEN_API batten_status batten_solid_create(batten_context *ctx, batten_spline 
 BATTEN_API batten_status batten_solid_evaluate(batten_context *ctx, const batten_solid *s, size_t count,
                                                const double *points, double *values, double *gradients,
                                                double *hessians);
+
+/* f and its gradient at many points, in time O(N + count) where the spline has many terms. f is then approximated:
+ * off by `error` as a distance (see above), and the same bits for any thread count. */
+typedef struct batten_solid_evaluator batten_solid_evaluator;
+
+/* accuracy: how far the surface may move, over the diagonal of the solid's box, 1e-12 .. 1e-2; 0: 1e-7, a tenth of
+ * what the polygoniser settles its vertices to. What the sums take for it is found by trial at some 500 places, which
+ * are summed directly too: about a second, more for kernels beyond r and r^2 ln r. DIRECT evaluators take no time to
+ * make and are exact. The solid is retained. Positive status: BATTEN_W_ACCURACY when the finest sums do not reach it;
+ * the info says what they reach. Fails: INVALID, NOMEM, TOO_LARGE, CANCELLED. */
+BATTEN_API batten_status batten_solid_evaluator_new(batten_context *ctx, batten_solid *s, batten_evaluation how,
+                                                    double accuracy, batten_solid_evaluator **out);
+/* points [count][n], finite; values [count], gradients [count][n], each may be NULL. ctx is the one that e was made
+ * with. One call at a time. Progress phase "evaluate" in large batches. Outputs are partly written on failure. Fails:
+ * INVALID, NOMEM, TOO_LARGE, CANCELLED. */
+BATTEN_API batten_status batten_solid_evaluator_evaluate(batten_context *ctx, batten_solid_evaluator *e, size_t count,
+                                                         const double *points, double *values, double *gradients);
+/* The same as a field of order 1, with the solid's bounds grown by ten times the largest error of f that was seen:
+ * for the polygoniser. Valid as long as e, and to be evaluated with its context. */
+BATTEN_API batten_field batten_solid_evaluator_field(batten_solid_evaluator *e);
+BATTEN_API batten_solid_evaluator_info batten_solid_evaluator_get_info(const batten_solid_evaluator *e);
+/* NULL is fine. */
+BATTEN_API void batten_solid_evaluator_free(batten_solid_evaluator *e);
+
 /* Bounds of f over boxes, as batten_field says: boxes [count][2][n], ranges [count][2]. */
 BATTEN_API batten_status batten_solid_bounds(batten_context *ctx, const batten_solid *s, size_t count,
                                              const double *boxes, double *ranges);
