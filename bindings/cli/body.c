@@ -98,24 +98,53 @@ static void choose_box(body *b, unsigned n) {
   }
 }
 
+/* Fast sums where the solid has many centres, a tenth of what the surface is settled to. */
+static batten_status open_evaluator(body *b) {
+  batten_status st = batten_solid_evaluator_new(b->run->ctx, b->solid, b->request->evaluation,
+                                                0.1 * b->request->surface.accuracy, &b->evaluator);
+  if (st < 0) return st;
+  body_note(b, st);
+  b->evaluation = batten_solid_evaluator_get_info(b->evaluator);
+  if (b->evaluation.method == BATTEN_EVALUATE_FAST) return BATTEN_OK;
+  batten_solid_evaluator_free(b->evaluator);
+  b->evaluator = NULL;
+  return BATTEN_OK;
+}
+
+static void close_evaluator(body *b) {
+  if (b->evaluator) b->evaluation = batten_solid_evaluator_get_info(b->evaluator);
+  batten_solid_evaluator_free(b->evaluator);
+  b->evaluator = NULL;
+}
+
+/* Measures and fields of b->mesh. */
+static batten_status look_at_mesh(body *b) {
+  batten_context *ctx = b->run->ctx;
+  batten_status st = body_add_fields(b);
+  close_evaluator(b); /* its memory, for what follows */
+  b->self_intersections = b->surface.self_intersections; /* counted on this very mesh */
+  return st < 0 ? st : batten_mesh_measure(ctx, b->mesh, &b->measures);
+}
+
 batten_status body_mesh(body *b, double cell) {
   double start = batten_now();
   batten_context *ctx = b->run->ctx;
-  batten_field field = batten_solid_field(b->solid);
   batten_polygonize_options *o = &b->request->surface;
   size_t count;
   const double *seeds = batten_solid_points(b->solid, &count);
+  unsigned n = batten_solid_dimension(b->solid);
   if (o->cell == 0) o->cell = cell;
-  choose_box(b, field.dimension);
-  batten_status st = field.dimension == 2
-                         ? batten_trace_outline(ctx, &field, count, seeds, o, &b->outline, &b->surface)
-                         : batten_polygonize(ctx, &field, count, seeds, o, &b->mesh, &b->surface);
+  choose_box(b, n);
+  batten_status st = open_evaluator(b);
+  if (st < 0) return st;
+  batten_field field = b->evaluator ? batten_solid_evaluator_field(b->evaluator) : batten_solid_field(b->solid);
+  st = n == 2 ? batten_trace_outline(ctx, &field, count, seeds, o, &b->outline, &b->surface)
+              : batten_polygonize(ctx, &field, count, seeds, o, &b->mesh, &b->surface);
   b->time_surface_s = batten_now() - start;
   body_note(b, st);
-  if (st < 0 || !b->mesh) return st;
-  st = batten_mesh_measure(ctx, b->mesh, &b->measures);
-  if (st >= 0) st = batten_mesh_self_intersections(ctx, b->mesh, &b->self_intersections);
-  return st < 0 ? st : body_add_fields(b);
+  if (st >= 0 && b->mesh) st = look_at_mesh(b);
+  close_evaluator(b);
+  return st;
 }
 
 /* ---- files --------------------------------------------------------------------------------------- */
@@ -161,6 +190,7 @@ int body_finish(body *b, const cli_report *report) {
 }
 
 void body_free(body *b) {
+  close_evaluator(b);
   batten_outline_free(b->outline);
   batten_mesh_free(b->mesh);
   if (b->run->ctx) batten_free(b->run->ctx, b->color);

@@ -13,6 +13,7 @@ typedef struct body_request {
   batten_picture_options picture;
   body_color color;
   bool dots;
+  batten_evaluation evaluation;
 } body_request;
 body_request body_request_default(void);
 
@@ -34,10 +35,10 @@ enum {
 #define BODY_OPTION_BOX(otherwise) \
   { "box", BODY_KEY_BOX, "X0,Y0[,Z0],X1,...", "cut the surface at this box; default: " otherwise }
 #define BODY_SHARP_DEG 35 /* of stacks and trees */
-#define BODY_OPTION_SHARP(otherwise)                                                                                 \
-  {                                                                                                                  \
-    "sharp", BODY_KEY_SHARP, "DEG",                                                                                  \
-        "mesh edges follow creases that turn by more than DEG degrees, 0 = none; default " otherwise                 \
+#define BODY_OPTION_SHARP(otherwise)                                                                 \
+  {                                                                                                  \
+    "sharp", BODY_KEY_SHARP, "DEG",                                                                  \
+        "mesh edges follow creases that turn by more than DEG degrees, 0 = none; default " otherwise \
   }
 #define BODY_OPTION_COLOR \
   { "color", BODY_KEY_COLOR, "WHAT", "colour the picture by none, gradient, mean or gauss (curvature); default none" }
@@ -50,8 +51,10 @@ typedef struct body {
   cli_request *common;
   cli_run *run;
   batten_solid *solid;
-  batten_mesh *mesh;       /* in space */
-  batten_outline *outline; /* in the plane */
+  batten_solid_evaluator *evaluator;      /* NULL: f is evaluated directly */
+  batten_solid_evaluator_info evaluation; /* of the surface */
+  batten_mesh *mesh;                      /* in space */
+  batten_outline *outline;                /* in the plane */
   batten_polygonize_info surface;
   batten_mesh_measures measures;
   size_t self_intersections;
@@ -75,10 +78,13 @@ int body_finish(body *b, const cli_report *report);
 /* Frees mesh, outline and colours, not the solid. */
 void body_free(body *b);
 
-/* ---- body_figures.c ---- */
+/* ---- body_fields.c ---- */
 
 batten_status body_add_fields(body *b);
 const double *body_color_values(const body *b); /* NULL = plain */
+
+/* ---- body_figures.c ---- */
+
 /* Keys of the surface, of its mesh, and of outlines; null where they do not apply. */
 void body_report(const body *b, cli_report *r);
 void body_print(const body *b);

@@ -27,6 +27,7 @@ enum {
   OPT_ORIENT_METHOD,
   OPT_METHOD,
   OPT_ACCURACY,
+  OPT_EVALUATE,
   OPT_LOO
 };
 
@@ -55,6 +56,9 @@ static const cli_option table[] = {
     {"method", OPT_METHOD, "NAME",
      "linear solver: auto, cholesky, mixed, ldl, qr or iterative (for many\npoints); default auto"},
     {"accuracy", OPT_ACCURACY, "EPS", "residual that an iterative solver aims at; default 1e-6"},
+    {"evaluate", OPT_EVALUATE, "HOW",
+     "f by direct sums, by fast ones to a tenth of the surface's accuracy, or\n"
+     "auto: fast from 12,000 centres on; default auto"},
     {"cell", BODY_KEY_CELL, "LENGTH",
      "edge length of the mesh; default from the points' spacing, but at most\n1/120 of the diagonal of their box"},
     BODY_OPTION_SHARP("0"),
@@ -94,10 +98,15 @@ static bool take_fit_option(solid_request *q, int key, const char *v) {
   static const char *const orient_data[] = {"auto", "gradients", "pairs", NULL};
   static const char *const orient_methods[] = {"auto", "energy", "planes", NULL};
   static const char *const methods[] = {"auto", "cholesky", "mixed", "ldl", "qr", "iterative", NULL};
+  static const char *const evaluations[] = {"auto", "direct", "fast", NULL};
   int word = 0;
   size_t count = 0;
   bool ok = true;
   switch (key) {
+    case OPT_EVALUATE:
+      ok = cli_parse_word("--evaluate", v, evaluations, &word);
+      q->fit.evaluation = q->body.evaluation = (batten_evaluation)word;
+      break;
     case OPT_CARRIER:
       q->carrier = v;
       break;

@@ -67,6 +67,22 @@ static void report_reduction(const solid_work *w, cli_report *r) {
   cli_report_number(r, "time_certify_s", used ? i->time_certify_s : NAN);
 }
 
+static const char *evaluation_name(batten_evaluation e) { return e == BATTEN_EVALUATE_FAST ? "fast" : "direct"; }
+
+/* How f was evaluated, by the check and for the surface. */
+static void report_evaluation(const solid_work *w, cli_report *r) {
+  const batten_solid_evaluator_info *check = &w->info.evaluation, *surface = &w->body.evaluation;
+  const bool check_fast = check->method == BATTEN_EVALUATE_FAST, fast = surface->method == BATTEN_EVALUATE_FAST;
+  cli_report_text(r, "check_evaluation", evaluation_name(check->method));
+  cli_report_number(r, "check_evaluation_error", check_fast ? check->error : NAN);
+  cli_report_text(r, "evaluation", evaluation_name(surface->method));
+  cli_report_number(r, "evaluation_error", fast ? surface->error : NAN);
+  cli_report_number(r, "evaluation_gradient_error", fast ? surface->gradient_error : NAN);
+  cli_report_number(r, "sums_accuracy", fast ? surface->sums_accuracy : NAN);
+  cli_report_number(r, "time_evaluation_setup_s", fast ? surface->time_new_s : NAN);
+  cli_report_number(r, "time_evaluation_s", fast ? surface->time_evaluate_s : NAN);
+}
+
 static void report_fit(const solid_work *w, cli_report *r) {
   const batten_solid_info *i = &w->info;
   const batten_saddle_info *s = &i->spline.saddle;
@@ -85,6 +101,7 @@ static void report_fit(const solid_work *w, cli_report *r) {
   cli_report_number(r, "residual_max", i->residual_max);
   cli_report_number(r, "distance_max", i->distance_max);
   cli_report_number(r, "distance_rms", i->distance_rms);
+  cli_report_count(r, "residual_points", i->residual_points);
   cli_report_number(r, "rcond", iterative ? NAN : s->rcond);
   cli_report_number(r, "loo_rms", i->spline.loo_rms);
   cli_report_count(r, "loo_samples", i->spline.loo_samples);
@@ -93,6 +110,7 @@ static void report_fit(const solid_work *w, cli_report *r) {
   cli_report_number(r, "spacing", i->spacing);
   cli_report_count(r, "factor_bytes", s->bytes);
   cli_report_number(r, "time_read_s", w->time_read_s);
+  cli_report_number(r, "time_data_s", i->time_data_s);
   cli_report_number(r, "time_assemble_s", s->time_assemble_s);
   cli_report_number(r, "time_project_s", s->time_project_s);
   cli_report_number(r, "time_factor_s", s->time_factor_s);
@@ -138,6 +156,7 @@ void solid_report(const solid_work *w, cli_report *r) {
   cli_report_box(r, 3, lower, upper);
   report_fit(w, r);
   report_sign(w, r);
+  report_evaluation(w, r);
   body_report(&w->body, r);
 }
 
@@ -156,6 +175,9 @@ void solid_summary(const solid_work *w) {
              i->reduced.error_certified, i->reduced.certified_points == i->reduced.points ? "" : ", by fast sums");
   cli_line("sign", "%s%s%s", sign_name(i->sign), i->orientation == BATTEN_ORIENTATION_NONE ? "" : ", orientation ",
            i->orientation == BATTEN_ORIENTATION_NONE ? "" : orientation_name(i->orientation));
+  if (w->body.evaluation.method == BATTEN_EVALUATE_FAST)
+    cli_line("evaluation", "fast sums, off by %.1e of the box at most", w->body.evaluation.error);
   body_print(&w->body);
-  body_print_end(&w->body, "fit", i->time_fit_s + i->time_check_s + i->time_orient_s, w->time_read_s);
+  body_print_end(&w->body, "fit", i->time_data_s + i->time_fit_s + i->time_check_s + i->time_orient_s,
+                 w->time_read_s);
 }

@@ -24,7 +24,7 @@ check "the summary has the volume" grep -Eq '^volume +4\.1' out
 "$batten" solid --help >help
 check "no line of the help is longer than 118" awk 'length > 118 { exit 1 }' help
 for option in output picture report save carrier order smoothing merge-radius orientation orient-data orient-method \
-  method cell box memory loo threads quiet; do
+  method evaluate cell box memory loo threads quiet; do
   check "the help tells --$option" grep -q -- " --$option" help
 done
 
@@ -53,6 +53,7 @@ run 2 "--orient-data: 'x'" solid ball.xyz --orient-data x
 run 2 "--orient-method: 'plane' is not one of auto, energy, planes; did you mean 'planes'?" \
   solid ball.xyz --orient-method plane
 run 2 "--method: 'lu'" solid ball.xyz --method lu
+run 2 "--evaluate: 'quick' is not one of auto, direct, fast" solid ball.xyz --evaluate quick
 run 2 "--cell: '0'" solid ball.xyz --cell 0
 run 2 "--box: '0,0,0,1,1' is not the 6 numbers" solid ball.xyz --box 0,0,0,1,1
 run 2 "--box: '0,0,x,1,1,1' is not 6 numbers" solid ball.xyz --box 0,0,x,1,1,1
@@ -190,6 +191,19 @@ run 2 "--reduce" solid s.csv --reduce -1
 run 0 "" solid s.csv --orientation estimate --reduce 0.05 --cell 0.4
 grep -q "^centres .* of all points$" out
 ok $? "pairs are summed directly too, and it says so: $(grep ^centres out)"
+# Fast sums make the same surface; curvatures then come from normals along the mesh: 1/2 on a ball of radius 2.
+is s.json evaluation direct
+is s.json evaluation_error None
+holds s.json residual_points "x == $(figure s.json points_used)"
+run 0 "" solid s.csv --report u.json --quiet --evaluate fast -o u.vtp
+is u.json evaluation fast
+is u.json check_evaluation fast
+holds u.json evaluation_error 'x > 0 && x < 1e-7'
+holds u.json check_evaluation_error 'x > 0 && x < 1e-7'
+holds u.json sums_accuracy 'x >= 1e-12 && x <= 1e-6'
+holds u.json volume "x > $(figure s.json volume) * 0.9999 && x < $(figure s.json volume) * 1.0001"
+holds u.json mesh_genus "x == $(figure s.json mesh_genus)"
+holds u.json gradient_max "x > $(figure s.json gradient_max) * 0.999 && x < $(figure s.json gradient_max) * 1.001"
 run 0 "warning: the surface reaches its box and is cut there; enlarge --box" solid s.csv --report u.json --quiet --box 1,-8,-2,6,-2,1.5
 is u.json status clipped
 is u.json mesh_closed False
