@@ -86,9 +86,10 @@ typedef struct batten_solid_options {
                            smoothing is the one with which the root mean square of |f| / |grad f| at the points, each cut
                            at 5 times the noise, is the noise to 5 % (discrepancy principle), at the cost of some 3 to 8
                            fits, above 6000 points of a subset of 3000 and 1 to 4 of all; spline.smoothing must then be 0.
-                           Where even the smoothest spline comes nearer to the points (the carrier alone fits them) or none
-        comes so near, it         is what comes nearest: see info.distance_rms. BATTEN_NOISE_ESTIMATE (any negative number): estimated
-        from what quadrics over local planes         leave. Default 0: spline.smoothing as it is. */
+                           Where even the smoothest spline comes nearer to the points (the carrier alone fits them), or
+                           none comes so near, it is the nearest one: see info.distance_rms. BATTEN_NOISE_ESTIMATE (any
+                           negative number): estimated from what quadrics over local planes leave. Default 0:
+                           spline.smoothing as it is. */
   double pair_distance; /* off-surface distance over the local spacing, in (0, 1]. Default 0.5. */
   size_t check_cells;   /* cells of the sign check's grid along the longest side, 8 .. 1000. Default 40. */
   double reduce; /* distance, caller's unit, >= 0: so few points become centres of the spline that the surface is
