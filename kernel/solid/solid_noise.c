@@ -124,12 +124,15 @@ batten_status batten_solid_estimate_noise(batten_context *ctx, const surface_dat
 /* Beyond so many times the noise a point is a stray and counts as if it were there; so do vanishing gradients. */
 static const double CUT = 5;
 
-batten_status batten_solid_rms_distance(batten_context *ctx, const batten_solid *s, size_t count,
-                                        const double *points, double noise, double *rms) {
-  size_t n = s->n;
-  double *values = batten_alloc_array(ctx, count, (n + 1) * sizeof *values), sum = 0;
+batten_status batten_solid_rms_distance(batten_context *ctx, const batten_solid *s, size_t of, const double *points,
+                                        double noise, double *rms) {
+  /* Many are evenly drawn: direct sums at all would take time in proportion to their square. */
+  const size_t n = s->n, count = batten_solid_points_to_sum(s, of);
+  double *values = batten_alloc_array(ctx, count, (2 * n + 1) * sizeof *values), sum = 0;
   if (!values) return BATTEN_E_NOMEM;
-  batten_status st = batten_solid_evaluate(ctx, s, count, points, values, values + count, NULL);
+  double *at = values + count * (n + 1);
+  for (size_t q = 0; q < count; q++) memcpy(at + q * n, points + batten_drawn(q, count, of) * n, n * sizeof *at);
+  batten_status st = batten_solid_evaluate(ctx, s, count, at, values, values + count, NULL);
   for (size_t i = 0; st >= 0 && i < count; i++) {
     const double *g = values + count + i * n;
     double f = fabs(values[i]), slope = sqrt(dot(n, g, g)), most = CUT * noise;

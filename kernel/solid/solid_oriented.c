@@ -151,13 +151,16 @@ static double place_pair(const surface_data *d, const double *normals, size_t i,
 typedef struct pair_query {
   const surface_data *data;
   const double *normals;
+  const unsigned char *bearer; /* [count] whether it has a pair */
   double pair_distance;
-  double *heights; /* [count][2] outside, inside */
+  double *heights; /* [count][2] outside, inside; 0: none */
 } pair_query;
 
 static void place_pairs(void *arg, size_t i) {
   const pair_query *q = arg;
   const double h = q->pair_distance * q->data->spacing[i];
+  q->heights[2 * i] = q->heights[2 * i + 1] = 0;
+  if (!q->bearer[i]) return;
   q->heights[2 * i] = place_pair(q->data, q->normals, i, 1, h);
   q->heights[2 * i + 1] = place_pair(q->data, q->normals, i, -1, h);
 }
@@ -269,11 +272,11 @@ static batten_status choose_bearers(batten_context *ctx, const surface_data *d, 
 static batten_status collect_pairs(batten_context *ctx, const surface_data *d, const double *normals,
                                    const unsigned char *bearer, double pair_distance, collection *c) {
   double *heights = batten_alloc_array(ctx, d->count, 2 * sizeof *heights);
-  pair_query q = {d, normals, pair_distance, heights};
+  pair_query q = {d, normals, bearer, pair_distance, heights};
   batten_status st = heights ? batten_for_points(ctx, "pairs", d->count, place_pairs, &q) : BATTEN_E_NOMEM;
   add_surface(c, d);
   for (size_t i = 0; st >= 0 && i < d->count; i++)
-    for (int side = 1; bearer[i] && side >= -1; side -= 2) {
+    for (int side = 1; side >= -1; side -= 2) {
       double x[3], h = heights[2 * i + (side < 0)];
       if (!(h > 0)) continue;
       pair_at(d, normals, i, side, h, x);
