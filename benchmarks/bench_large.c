@@ -7,8 +7,9 @@
  *   --data      lines "x y z", or "x y z value"; without values those of a ball around the points
  *   --dense     a fit by factors too, up to that N: Cholesky, from 2000 on its mixed form
  *   N           default 10000 40000 100000 300000
- * Each row is a process of its own, whose peak of resident memory is told beside what batten had taken at most. Short
- * fits are repeated, the fastest counts. */
+ * "silent" is the longest time without a progress call, which is what a host waits at most for a cancel, and its
+ * phase. Each row is a process of its own, whose peak of resident memory is told beside what batten had taken at
+ * most. Short fits are repeated, the fastest counts. */
 #include "tap.h"
 
 #include <batten/batten.h>
@@ -16,6 +17,7 @@
 #include <unistd.h>
 
 #include "peak.h"
+#include "silence.h"
 
 enum { MOST_SIZES = 32, MOST_ACCURACIES = 8, REPEATS = 5 };
 static const double REPEAT_BELOW_S = 0.3;
@@ -32,6 +34,7 @@ typedef struct row {
   bool done;
   size_t n, bytes, resident, dense_bytes;
   double accuracy, total, product, dense;
+  silence silence;
   batten_spline_info info;
 } row;
 
@@ -141,7 +144,9 @@ static bool fit(batten_context *ctx, const batten_spline_data *d, const batten_s
     batten_spline_info info;
     batten_bytes_peak_reset(ctx);
     double start = batten_now();
+    silence_begin(&out->silence);
     batten_status st = batten_spline_fit(ctx, d, o, &s, &info);
+    silence_end(&out->silence);
     double time = batten_now() - start;
     batten_spline_free(s);
     if (st != BATTEN_OK) printf("\nN = %zu: %s: %s\n\n", d->count, batten_status_text(st), batten_error(ctx));
@@ -161,6 +166,7 @@ static row measure(const settings *s, size_t n, double accuracy, bool dense) {
   batten_spline_options o = batten_spline_options_default();
   double *points = make_data(s, &out.n);
   c.threads = s->threads;
+  c.progress = silence_heard, c.progress_user = &out.silence;
   if (points && batten_context_new(&c, &ctx) >= 0) {
     d.count = out.n, d.points = points, d.values = points + 3 * out.n;
     o.m = s->order;
@@ -219,8 +225,9 @@ static void print_head(const settings *s, double accuracy) {
   printf(
       "| N | levels | set-up s | its 1e-3 / 1e-6 / 1e-9 (all) | s per product | solve s | set-up + solve s | grows "
       "as N^ "
-      "| whole fit s | GB (process) | residual, 1000 direct rows | products | largest | by factors s, GB |\n"
-      "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
+      "| whole fit s | GB (process) | residual, 1000 direct rows | products | largest | silent s "
+      "| by factors s, GB |\n"
+      "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
 }
 
 static void print_row(const row *r, const row *before) {
@@ -242,8 +249,9 @@ static void print_row(const row *r, const row *before) {
     printf(" %.2f |", log(solving(r) / solving(before)) / log((double)r->n / (double)before->n));
   else
     printf(" |");
-  printf(" %.2f | %.2f (%.2f) | %.1e | %.0e | %.1e |", r->total, (double)r->bytes / 1e9, (double)r->resident / 1e9,
-         i->residual_rows, i->products_accuracy, r->info.residual_max);
+  printf(" %.2f | %.2f (%.2f) | %.1e | %.0e | %.1e | %.2f (%s) |", r->total, (double)r->bytes / 1e9,
+         (double)r->resident / 1e9, i->residual_rows, i->products_accuracy, r->info.residual_max, r->silence.longest,
+         r->silence.longest_in);
   if (isnan(r->dense))
     printf(" |\n");
   else
@@ -279,6 +287,7 @@ static void json_row(FILE *json, const row *r, bool first) {
   json_number(json, "residual_rows", i->residual_rows);
   json_number(json, "products_accuracy", i->products_accuracy);
   json_number(json, "residual_max", r->info.residual_max);
+  json_number(json, "silent_s", r->silence.longest);
   json_number(json, "factors_s", r->dense);
   json_number(json, "factors_bytes", isnan(r->dense) ? NAN : (double)r->dense_bytes);
   fprintf(json, "}");
