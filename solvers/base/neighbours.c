@@ -135,8 +135,8 @@ static void split_below(void *arg, size_t i) {
 enum { LEVELS_APART = 6 };          /* of 2^6 nodes each level is split by tasks, below them one task does it all */
 static const size_t SERIAL = 10000; /* points that are sooner split than given to threads */
 
-/* Who splits what changes nothing: a node is split by its own points alone. */
-static void build(batten_context *ctx, batten_tree *t, const double *points) {
+/* Who splits what changes nothing: a node is split by its own points alone. Fails: CANCELLED. */
+static batten_status build(batten_context *ctx, batten_tree *t, const double *points) {
   range nodes[1 << LEVELS_APART];
   building b = {t, points, nodes};
   size_t count = 1;
@@ -144,10 +144,12 @@ static void build(batten_context *ctx, batten_tree *t, const double *points) {
   nodes[0] = (range){0, t->count};
   if (t->count <= SERIAL) {
     split_below(&b, 0);
-    return;
+    return BATTEN_OK;
   }
   for (unsigned level = 0; level < LEVELS_APART; level++) {
     range before[1 << LEVELS_APART];
+    batten_status st = batten_progress(ctx, "tree", (double)level / (LEVELS_APART + 2));
+    if (st < 0) return st;
     memcpy(before, nodes, count * sizeof *nodes);
     batten_parallel(ctx, count, split_node, &b);
     for (size_t i = count; i-- > 0;) {
@@ -156,7 +158,10 @@ static void build(batten_context *ctx, batten_tree *t, const double *points) {
     }
     count *= 2;
   }
+  batten_status st = batten_progress(ctx, "tree", (double)LEVELS_APART / (LEVELS_APART + 2));
+  if (st < 0) return st;
   batten_parallel(ctx, count, split_below, &b);
+  return batten_progress(ctx, "tree", 1);
 }
 
 void batten_tree_order(const batten_tree *t, size_t *order) {
@@ -273,11 +278,12 @@ batten_status batten_tree_new(batten_context *ctx, unsigned n, size_t count, con
   t->index = batten_alloc_array(ctx, count, sizeof(size_t));
   t->axis = batten_alloc_array(ctx, count, 1);
   t->split = batten_alloc_array(ctx, count, sizeof(double));
-  if (!t->points || !t->index || !t->axis || !t->split) {
+  batten_status st = BATTEN_E_NOMEM;
+  if (t->points && t->index && t->axis && t->split) st = build(ctx, t, points);
+  if (st < 0) {
     batten_tree_free(ctx, t);
-    return BATTEN_E_NOMEM;
+    return st;
   }
-  build(ctx, t, points);
   *out = t;
   return BATTEN_OK;
 }

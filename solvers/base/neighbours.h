@@ -11,8 +11,9 @@
 
 typedef struct batten_tree batten_tree;
 
-/* Copies the points. Fails: INVALID (n, non-finite point), TOO_LARGE, NOMEM. Queries only read the tree and need no
- * context: they may run in worker tasks. */
+/* Copies the points. More than 10,000 are split by tasks, with progress (phase "tree") between. Fails: INVALID (n,
+ * non-finite point), TOO_LARGE, NOMEM, CANCELLED. Queries only read the tree and need no context: they may run in
+ * worker tasks. */
 batten_status batten_tree_new(batten_context *ctx, unsigned n, size_t count, const double *points, batten_tree **out);
 void batten_tree_free(batten_context *ctx, batten_tree *tree);
 

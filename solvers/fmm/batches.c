@@ -271,17 +271,20 @@ done:
 
 /* ---- a batch ---- */
 
-/* order [count]: points that lie together stand together; NULL without memory: the caller's order does then. */
-static size_t *order_of(batten_context *ctx, unsigned n, size_t count, const double *points) {
+/* *order [count]: points that lie together stand together; NULL without memory: the caller's order does then. Fails:
+ * CANCELLED. */
+static batten_status order_of(batten_context *ctx, unsigned n, size_t count, const double *points, size_t **order) {
   batten_tree *tree = NULL;
-  size_t *order = batten_alloc_array(ctx, count, sizeof *order);
-  if (order && batten_tree_new(ctx, n, count, points, &tree) >= 0) {
-    batten_tree_order(tree, order);
+  *order = batten_alloc_array(ctx, count, sizeof **order);
+  batten_status st = *order ? batten_tree_new(ctx, n, count, points, &tree) : BATTEN_E_NOMEM;
+  if (st >= 0) {
+    batten_tree_order(tree, *order);
     batten_tree_free(ctx, tree);
-    return order;
+    return BATTEN_OK;
   }
-  batten_free(ctx, order);
-  return NULL;
+  batten_free(ctx, *order);
+  *order = NULL;
+  return batten_expect(ctx, st, BATTEN_E_NOMEM);
 }
 
 /* Slices: all points at first. When there is no memory for the nodes of a slice, those of the slices before go; when
@@ -311,12 +314,11 @@ batten_status batten_fmm_batch(batten_context *ctx, batten_fmm_evaluator *e, siz
     }
     batten_fmm_nodes_drop(e);
     e->info.drops++;
-    if (empty) {
-      size = (now + 1) / 2;
-      if (!ordered && done == 0) order = order_of(ctx, e->kernel.n, count, points);
-      ordered = true;
-    }
     st = batten_expect(ctx, st, BATTEN_E_NOMEM);
+    if (!empty) continue;
+    size = (now + 1) / 2;
+    if (!ordered && done == 0) st = order_of(ctx, e->kernel.n, count, points, &order);
+    ordered = true;
   }
   batten_free(ctx, order);
   return st;

@@ -138,14 +138,17 @@ static void down_task(void *arg, size_t index) {
 
 /* ---- a product ---- */
 
-/* Tasks in groups of FMM_GROUP, each with its own scratch. */
-static batten_status run(batten_context *ctx, pass *p, size_t tasks, void (*task)(void *, size_t), double from,
-                         double to) {
-  for (size_t first = 0; first < tasks; first += FMM_GROUP) {
+/* One translates to 128 cells, which takes some hundredths of a second: a group is short enough for a cancel. */
+enum { ACROSS_GROUP = FMM_GROUP / 4 };
+
+/* Tasks in groups of at most FMM_GROUP, each with its own scratch. */
+static batten_status run(batten_context *ctx, pass *p, size_t tasks, size_t group, void (*task)(void *, size_t),
+                         double from, double to) {
+  for (size_t first = 0; first < tasks; first += group) {
     batten_status st = batten_progress(ctx, "sums", from + (to - from) * (double)first / (double)tasks);
     if (st < 0) return st;
     p->first_task = first;
-    batten_parallel(ctx, tasks - first < FMM_GROUP ? tasks - first : FMM_GROUP, task, p);
+    batten_parallel(ctx, tasks - first < group ? tasks - first : group, task, p);
   }
   return BATTEN_OK;
 }
@@ -153,7 +156,7 @@ static batten_status run(batten_context *ctx, pass *p, size_t tasks, void (*task
 static batten_status run_level(batten_context *ctx, pass *p, unsigned level, void (*task)(void *, size_t),
                                double at) {
   p->first = p->f->tree.level_first[level], p->last = p->f->tree.level_first[level + 1];
-  return run(ctx, p, (p->last - p->first + FMM_CELLS_TOGETHER - 1) / FMM_CELLS_TOGETHER, task, at, at);
+  return run(ctx, p, (p->last - p->first + FMM_CELLS_TOGETHER - 1) / FMM_CELLS_TOGETHER, FMM_GROUP, task, at, at);
 }
 
 batten_status batten_fmm_passes(batten_context *ctx, batten_fmm *f, const double *weights, const double *dipoles,
@@ -165,9 +168,9 @@ batten_status batten_fmm_passes(batten_context *ctx, batten_fmm *f, const double
   memset(f->work.sums, 0, f->tree.targets.count * (gradients ? 1 + f->kernel.n : 1) * sizeof(double));
   st = batten_fmm_climb(ctx, &p.at, &f->tree, &p.terms, p.dipoles, f->work.tensors, f->work.outer, f->work.scratch);
   if (st < 0) return st;
-  if ((st = run(ctx, &p, f->lists.tasks, near_task, 0.1, 0.5)) < 0) return st;
+  if ((st = run(ctx, &p, f->lists.tasks, FMM_GROUP, near_task, 0.1, 0.5)) < 0) return st;
   memset(f->work.inner, 0, f->tree.cells * f->operators->stride * sizeof(double));
-  if ((st = run(ctx, &p, f->lists.chunks, across_task, 0.5, 0.9)) < 0) return st;
+  if ((st = run(ctx, &p, f->lists.chunks, ACROSS_GROUP, across_task, 0.5, 0.9)) < 0) return st;
   for (unsigned level = 0; level < f->tree.levels; level++)
     if ((st = run_level(ctx, &p, level, down_task, 0.9)) < 0) return st;
   return BATTEN_OK;
