@@ -9,9 +9,10 @@
 #include <string.h>
 
 #include "base/checked.h"
+#include "base/points.h"
 #include "basis/eigen3.h"
 
-/* Unit size: nearer points are one. */
+/* Unit size: nearer points are one. Many in one place would be each other's neighbours and nobody else's. */
 static const double SAME = 1e-9;
 /* By which planes must be less in doubt than energy: noise, rims and uneven samples make some hundredths. */
 static const double DOUBT = 0.1;
@@ -113,11 +114,11 @@ static void sign_planes(const batten_orient_graph *g, double *gradients) {
 /* What one call holds. Points and normals stand in a tree's order: neighbours lie near each other in memory too. */
 typedef struct orientation {
   unsigned n;
-  size_t count;
-  size_t *order;  /* [count] where a point came from */
-  double *points; /* [count][n] unit size */
-  double *planes; /* [count][n] normals by planes */
-  double *energy; /* [count][n] normals by energy */
+  size_t given, count; /* points of the caller, different ones */
+  size_t *place;       /* [given] which of the different ones a point is */
+  double *points;      /* [count][n] unit size */
+  double *planes;      /* [count][n] normals by planes */
+  double *energy;      /* [count][n] normals by energy */
   batten_orient_graph graph;
   batten_orient_forest forest;
   batten_orient_info info;
@@ -137,15 +138,11 @@ static batten_status orient_subset(batten_context *ctx, orientation *o, size_t e
     goto done;
   size_t found = most;
   if ((status = batten_orient_spread(ctx, &o->graph, &found, chosen, o->energy)) < 0) goto done;
-  if (found < n + 2) {
-    status = batten_fail(ctx, BATTEN_E_INVALID, "points: %zu different ones; %u or more are needed", found, n + 2);
-    goto done;
-  }
   for (size_t i = 0; i < found; i++) {
     memcpy(points + i * n, o->points + chosen[i] * n, n * sizeof *points);
     memcpy(start + i * n, o->planes + chosen[i] * n, n * sizeof *start);
   }
-  if ((status = batten_orient_graph_new(ctx, n, found, points, false, &part)) < 0) goto done;
+  if ((status = batten_orient_graph_new(ctx, n, found, points, false, 0.4, &part)) < 0) goto done;
   if ((status = batten_orient_energy(ctx, &part, start, &field)) < 0) goto done;
   status = batten_orient_field_gradients(ctx, &field, o->count, o->points, o->energy);
   o->info.lambda = field.lambda;
@@ -170,30 +167,79 @@ static batten_status orient_all(batten_context *ctx, orientation *o) {
   return BATTEN_OK;
 }
 
-static bool has_equal_points(const batten_orient_graph *graph) {
-  size_t i = 0;
-  while (i < graph->count && graph->distance[i * graph->k] > SAME) i++;
-  return i < graph->count;
+typedef struct crowd_query {
+  const batten_tree *tree;
+  const double *unit;
+  const size_t *order;
+  unsigned n;
+  unsigned char *crowded; /* [count] in the tree's order */
+} crowd_query;
+
+static void find_crowded(void *arg, size_t i) {
+  const crowd_query *q = arg;
+  q->crowded[i] = batten_tree_any_within(q->tree, q->unit + q->order[i] * q->n, SAME, q->order[i]);
 }
 
-/* Unit size, tree's order. */
+/* Says which points are different, in the tree's order; o->count becomes how many, o->place where each of the given
+ * ones went. Nearly all points are alone, which is found by tasks; who stands for the others depends on those before.
+ * first [given]: out, the caller's index of each different point. */
+static batten_status merge_points(batten_context *ctx, orientation *o, const batten_tree *tree, const double *unit,
+                                  size_t *first) {
+  unsigned n = o->n;
+  size_t *order = batten_alloc_array(ctx, o->given, sizeof *order), *near = NULL;
+  unsigned char *crowded = batten_alloc(ctx, o->given);
+  batten_status status = order && crowded ? BATTEN_OK : BATTEN_E_NOMEM;
+  if (status < 0) goto done;
+  batten_tree_order(tree, order);
+  status = batten_for_points(ctx, "merge", o->given, find_crowded, &(crowd_query){tree, unit, order, n, crowded});
+  if (status < 0) goto done;
+  for (size_t i = 0; i < o->given; i++) o->place[i] = SIZE_MAX;
+  o->count = 0;
+  for (size_t i = 0; i < o->given; i++) {
+    if (o->place[order[i]] != SIZE_MAX) continue;
+    if (crowded[i]) {
+      if (!near && !(near = batten_alloc_array(ctx, o->given, sizeof *near))) {
+        status = BATTEN_E_NOMEM;
+        goto done;
+      }
+      size_t found = batten_tree_within(tree, unit + order[i] * n, SAME, near);
+      for (size_t q = 0; q < found; q++)
+        if (o->place[near[q]] == SIZE_MAX) o->place[near[q]] = o->count;
+    }
+    o->place[order[i]] = o->count;
+    first[o->count++] = order[i];
+  }
+  if (o->count < n + 2)
+    status = batten_fail(ctx, BATTEN_E_INVALID, "points: %zu different ones; %u or more are needed", o->count, n + 2);
+done:
+  batten_free(ctx, near);
+  batten_free(ctx, crowded);
+  batten_free(ctx, order);
+  return status;
+}
+
+/* Unit size, tree's order, each place once. */
 static batten_status take_points(batten_context *ctx, orientation *o, const double *points) {
   unsigned n = o->n;
   batten_tree *tree = NULL;
-  double *unit = batten_alloc_array(ctx, o->count, n * sizeof *unit);
-  batten_status status = unit ? to_unit_size(ctx, n, o->count, points, unit) : BATTEN_E_NOMEM;
+  size_t *first = NULL;
+  double *unit = batten_alloc_array(ctx, o->given, n * sizeof *unit);
+  batten_status status = unit ? to_unit_size(ctx, n, o->given, points, unit) : BATTEN_E_NOMEM;
   if (status >= 0) status = batten_progress(ctx, "orient", 0);
-  if (status >= 0) status = batten_tree_new(ctx, n, o->count, unit, &tree);
+  if (status >= 0) status = batten_tree_new(ctx, n, o->given, unit, &tree);
   if (status < 0) goto done;
   status = BATTEN_E_NOMEM;
-  if (!(o->order = batten_alloc_array(ctx, o->count, sizeof *o->order)) ||
-      !(o->points = batten_alloc_array(ctx, o->count, n * sizeof *o->points)))
+  if (!(o->place = batten_alloc_array(ctx, o->given, sizeof *o->place)) ||
+      !(first = batten_alloc_array(ctx, o->given, sizeof *first)))
     goto done;
-  batten_tree_order(tree, o->order);
-  for (size_t i = 0; i < o->count; i++) memcpy(o->points + i * n, unit + o->order[i] * n, n * sizeof *unit);
+  if ((status = merge_points(ctx, o, tree, unit, first)) < 0) goto done;
+  status = BATTEN_E_NOMEM;
+  if (!(o->points = batten_alloc_array(ctx, o->count, n * sizeof *o->points))) goto done;
+  for (size_t i = 0; i < o->count; i++) memcpy(o->points + i * n, unit + first[i] * n, n * sizeof *unit);
   status = BATTEN_OK;
 done:
   batten_tree_free(ctx, tree);
+  batten_free(ctx, first);
   batten_free(ctx, unit);
   return status;
 }
@@ -201,7 +247,7 @@ done:
 /* Energy in the end, where AUTO does not find planes less in doubt. */
 static batten_status orient_by_energy(batten_context *ctx, orientation *o, bool automatic, size_t energy_points) {
   if (!(o->energy = batten_alloc_array(ctx, o->count, o->n * sizeof *o->energy))) return BATTEN_E_NOMEM;
-  bool whole = o->count <= energy_points && !has_equal_points(&o->graph), refined = false;
+  bool whole = o->count <= energy_points, refined = false;
   batten_status status = whole ? orient_all(ctx, o) : orient_subset(ctx, o, energy_points);
   if (automatic && status == BATTEN_E_SINGULAR) return BATTEN_OK;
   if (status >= 0 && o->count / REFINE >= energy_points) {
@@ -223,7 +269,7 @@ static void release(batten_context *ctx, orientation *o) {
   batten_free(ctx, o->energy);
   batten_free(ctx, o->planes);
   batten_free(ctx, o->points);
-  batten_free(ctx, o->order);
+  batten_free(ctx, o->place);
 }
 
 batten_orient_options batten_orient_options_default(void) {
@@ -236,13 +282,13 @@ batten_status batten_orient_points(batten_context *ctx, unsigned n, size_t count
   batten_status status = batten_check_struct(ctx, "batten_orient_options", used.struct_size, sizeof used);
   if (status >= 0) status = check(ctx, n, count, points, used.method, used.energy_points, normals);
   if (status < 0) return status;
-  orientation o = {.n = n, .count = count, .info.method = BATTEN_ORIENT_METHOD_PLANES};
+  orientation o = {.n = n, .given = count, .info.method = BATTEN_ORIENT_METHOD_PLANES};
   if ((status = take_points(ctx, &o, points)) < 0) goto done;
   status = BATTEN_E_NOMEM;
-  if (!(o.planes = batten_alloc_array(ctx, count, n * sizeof *o.planes))) goto done;
-  bool many = count > used.energy_points;
+  if (!(o.planes = batten_alloc_array(ctx, o.count, n * sizeof *o.planes))) goto done;
+  bool many = o.count > used.energy_points;
   if ((status = batten_progress(ctx, "orient", 0.05)) < 0) goto done;
-  if ((status = batten_orient_graph_new(ctx, n, count, o.points, many, &o.graph)) < 0) goto done;
+  if ((status = batten_orient_graph_new(ctx, n, o.count, o.points, many, 0.05, &o.graph)) < 0) goto done;
   if (many && (status = batten_orient_find_strays(ctx, &o.graph)) < 0) goto done;
   if ((status = batten_orient_forest_new(ctx, &o.graph, &o.forest)) < 0) goto done;
   if ((status = batten_orient_planes(ctx, &o.graph, &o.forest, o.planes)) < 0) goto done;
@@ -251,9 +297,9 @@ batten_status batten_orient_points(batten_context *ctx, unsigned n, size_t count
   if (status < 0) goto done;
   bool energy = o.info.method == BATTEN_ORIENT_METHOD_ENERGY;
   for (size_t i = 0; i < count; i++)
-    memcpy(normals + o.order[i] * n, (energy ? o.energy : o.planes) + i * n, n * sizeof *normals);
+    memcpy(normals + i * n, (energy ? o.energy : o.planes) + o.place[i] * n, n * sizeof *normals);
   o.info.strays = o.graph.strays;
-  o.info.lambda = energy ? lambda_in_box(n, count, o.points, o.info.lambda) : 0;
+  o.info.lambda = energy ? lambda_in_box(n, o.count, o.points, o.info.lambda) : 0;
   if (!energy) o.info.energy_points = o.info.pieces = o.info.doubtful = 0;
   if (info) *info = o.info;
 done:

@@ -25,9 +25,9 @@ typedef struct batten_orient_graph {
 } batten_orient_graph;
 
 /* count >= 2. adapt: planes go through more points where there is noise, fewer where walls are thin; for dense
- * samples. On failure nothing is held. */
+ * samples. part: of the work done, for the host. On failure nothing is held. */
 batten_status batten_orient_graph_new(batten_context *ctx, unsigned n, size_t count, const double *points, bool adapt,
-                                      batten_orient_graph *graph);
+                                      double part, batten_orient_graph *graph);
 void batten_orient_graph_free(batten_context *ctx, batten_orient_graph *graph);
 
 /* How well normals u at a and v at b fit to one smooth surface, in [-1, 1]: v reflected in the bisector plane of a
@@ -37,7 +37,7 @@ void batten_orient_graph_free(batten_context *ctx, batten_orient_graph *graph);
 double batten_orient_agreement(unsigned n, const double *a, const double *b, const double *u, const double *v);
 
 /* Neighbours and planes of the graph: see orient_local.c. tree: of its points. */
-batten_status batten_orient_fit_planes(batten_context *ctx, const batten_tree *tree, bool adapt,
+batten_status batten_orient_fit_planes(batten_context *ctx, const batten_tree *tree, bool adapt, double part,
                                        batten_orient_graph *graph);
 /* Finds points that lie off the surface: see orient_strays.c. Their area becomes 0. */
 batten_status batten_orient_find_strays(batten_context *ctx, batten_orient_graph *graph);
@@ -75,9 +75,9 @@ batten_status batten_orient_forest_new(batten_context *ctx, const batten_orient_
 void batten_orient_forest_plant(const batten_orient_graph *graph, batten_orient_forest *forest);
 void batten_orient_forest_free(batten_context *ctx, batten_orient_forest *forest);
 /* Joins trees along ties of weight (0 .. 1) <= loosest. Ties that are more than 0.7 loose do not join two
- * that are closed already. */
+ * that are closed already. part: of the work done, for the host. */
 batten_status batten_orient_forest_join(batten_context *ctx, const batten_orient_graph *graph,
-                                        batten_orient_forest *forest, double loosest);
+                                        batten_orient_forest *forest, double loosest, double part);
 /* The tree of point i; *opposed: whether its plane's sign is opposite to the root's. */
 size_t batten_orient_forest_root(batten_orient_forest *forest, size_t i, bool *opposed);
 /* Makes one tree of those of i and j, in which the planes' signs of i and j are opposed or not. */

@@ -104,8 +104,8 @@ static batten_status walk(batten_context *ctx, const batten_orient_graph *graph,
   double least = INFINITY; /* doubt so far */
   memcpy(w->best.g, start, bytes);
   for (int step = 0; step < LAMBDAS; step++) {
-    double part = (step + 0.5) / LAMBDAS;
-    batten_status status = batten_progress(ctx, "orient", (double)step / LAMBDAS);
+    double part = 0.4 + 0.3 * (step + 0.5) / LAMBDAS; /* planes and what follows have the rest */
+    batten_status status = batten_progress(ctx, "orient", part - 0.15 / LAMBDAS);
     if (status < 0) return status;
     status = batten_orient_system_factor(ctx, s, LAMBDA[step]);
     if (status == BATTEN_E_SINGULAR && step > 0) return batten_orient_system_factor(ctx, s, LAMBDA[step - 1]);

@@ -17,13 +17,13 @@ static const double LOOSE = 0.7;
 /* Ties of planes less flat than SURE come behind the firm ones of others. */
 static const double SURE = 0.5, UNSURE = 0.3;
 static const double CLOSED = 0.1; /* openness of random samples of a torus: 0.03 */
-/* Weights 0 .. STEPS of ties, STRAY .. STRAY + STEPS of strays' ties. */
+/* Weights 0 .. STEPS of ties, STRAY .. STRAY + STEPS of strays' ties; NO_TIE: the pair counts elsewhere. */
 enum {
   CHUNK = 1024,
-  SLICE = 1 << 20,
-  STEPS = 32767,
+  SLICE = 1 << 18,
+  STEPS = 32766,
   STRAY = STEPS + 1,
-  NO_TIE = STRAY + STEPS + 1,
+  NO_TIE = STRAY + STEPS + 1, /* 65534: weights are unsigned short */
   BUCKETS = NO_TIE + 1
 };
 
@@ -56,11 +56,6 @@ static bool is_repeated(const batten_orient_graph *g, size_t i, size_t j) {
   return false;
 }
 
-static unsigned bucket(const weigh_task *t, size_t tie) {
-  const batten_orient_graph *g = t->graph;
-  return is_repeated(g, tie / g->k, g->index[tie]) ? NO_TIE : t->weight[tie];
-}
-
 static void weigh(void *task, size_t chunk) {
   weigh_task *t = task;
   const batten_orient_graph *g = t->graph;
@@ -69,21 +64,20 @@ static void weigh(void *task, size_t chunk) {
     for (size_t q = 0; q < g->k; q++) {
       size_t j = g->index[i * g->k + q];
       bool stray = g->area[i] == 0 || g->area[j] == 0;
-      double w = fmin(fmax(tie_weight(g, i, j), 0), 1);
-      t->weight[i * g->k + q] = (unsigned short)((stray ? STRAY : 0) + lround(w * STEPS));
+      long weight = NO_TIE;
+      if (!is_repeated(g, i, j)) weight = (stray ? STRAY : 0) + lround(fmin(fmax(tie_weight(g, i, j), 0), 1) * STEPS);
+      t->weight[i * g->k + q] = (unsigned short)weight;
     }
 }
 
 /* Counting sort; equal weights keep the order of the points. first [BUCKETS + 1]. */
-static void sort_ties(const weigh_task *t, size_t pairs, size_t *first, batten_orient_forest *f) {
+static void sort_ties(size_t pairs, size_t *first, batten_orient_forest *f) {
   memset(first, 0, (BUCKETS + 1) * sizeof *first);
-  for (size_t p = 0; p < pairs; p++) first[bucket(t, p) + 1]++;
+  for (size_t p = 0; p < pairs; p++) first[f->weight[p] + 1]++;
   for (size_t b = 0; b < BUCKETS; b++) first[b + 1] += first[b];
   f->count = first[NO_TIE];
-  for (size_t p = 0; p < pairs; p++) {
-    unsigned b = bucket(t, p);
-    if (b != NO_TIE) f->ties[first[b]++] = p;
-  }
+  for (size_t p = 0; p < pairs; p++)
+    if (f->weight[p] != NO_TIE) f->ties[first[f->weight[p]]++] = p;
 }
 
 void batten_orient_forest_plant(const batten_orient_graph *g, batten_orient_forest *f) {
@@ -120,10 +114,10 @@ batten_status batten_orient_forest_new(batten_context *ctx, const batten_orient_
       !(f.sum = batten_alloc_array(ctx, g->count, 3 * sizeof *f.sum)) ||
       !(f.total = batten_alloc_array(ctx, g->count, sizeof *f.total)))
     goto done;
-  weigh_task task = {g, f.weight};
-  batten_parallel(ctx, (g->count + CHUNK - 1) / CHUNK, weigh, &task);
   if ((status = batten_progress(ctx, "orient", 0.3)) < 0) goto done;
-  sort_ties(&task, pairs, first, &f);
+  batten_parallel(ctx, (g->count + CHUNK - 1) / CHUNK, weigh, &(weigh_task){g, f.weight});
+  if ((status = batten_progress(ctx, "orient", 0.32)) < 0) goto done;
+  sort_ties(pairs, first, &f);
   batten_orient_forest_plant(g, &f);
 done:
   batten_free(ctx, first);
@@ -167,7 +161,7 @@ void batten_orient_forest_tie(batten_orient_forest *f, size_t i, size_t j, bool 
 }
 
 batten_status batten_orient_forest_join(batten_context *ctx, const batten_orient_graph *g, batten_orient_forest *f,
-                                        double loosest) {
+                                        double loosest, double part) {
   unsigned n = g->n;
   const double *x = g->surface, *u = g->plane;
   for (; f->next < f->count; f->next++) {
@@ -175,7 +169,7 @@ batten_status batten_orient_forest_join(batten_context *ctx, const batten_orient
     double weight = (double)f->weight[f->ties[f->next]] / STEPS; /* above 1: of strays */
     if (weight > loosest) break;
     if (f->next % SLICE == 0) {
-      batten_status status = batten_progress(ctx, "orient", 0.35);
+      batten_status status = batten_progress(ctx, "orient", part);
       if (status < 0) return status;
     }
     bool of_i, of_j;

@@ -10,10 +10,11 @@
  * see when the wall is thinner than its spacing, and no neighbour graph tells when the rim between them is not
  * sampled. The constant 1/2 settles outside and inside too. Errors of the areas scale w and change no sign.
  *
- * W is summed by a tree whose cells count as one dipole when they lie far and belong to one piece [Barill, Dickson,
- * Schmidt, Levin, Jacobson 2018, "Fast winding numbers for soups and clouds"]; the points stand in a tree's order, so
- * its cells are halves of ranges. Points t are a part of all, some of every piece. The signs: from several starts,
- * the turn of a piece or of two that lowers the misfit most, until none does. */
+ * W is summed by a tree for each piece, whose cells count as one dipole when they lie far [Barill, Dickson, Schmidt,
+ * Levin, Jacobson 2018, "Fast winding numbers for soups and clouds"]; the points stand in a tree's order, so cells
+ * are halves of ranges. (In one tree for all, cells in which pieces mingle would have to be summed point by point,
+ * from any distance.) Points t are a part of all, some of every piece. The signs: from several starts, the turn of a
+ * piece or of two that lowers the misfit most, until none does. */
 #include <math.h>
 #include <string.h>
 
@@ -24,10 +25,10 @@
 enum {
   LEAF = 16,
   DEPTH = 64,
-  PLACES = 16384,
+  PLACES = 2048, /* 8000 points decide no sign otherwise with all of them */
   PLACES_OF_PIECE = 32,
-  CHUNK = 64,
-  SLICE = 64 * CHUNK,
+  CHUNK = 32,
+  SLICE = 32 * CHUNK,
   TURNS_MAX = 10000
 };
 /* Radius over distance of cells that count as one dipole: a hundredth of their part in w. */
@@ -38,26 +39,70 @@ static const double VOTES = 0.02;
 typedef struct cell {
   size_t low, high, left; /* left 0: a leaf, else the first of two children */
   double middle[3], radius, area, dipole[3];
-  size_t piece; /* NONE: nothing in it, MIXED: several */
 } cell;
 
-static const size_t NONE = SIZE_MAX, MIXED = SIZE_MAX - 1;
+static const size_t NONE = SIZE_MAX;
 
 typedef struct gauss {
   const batten_orient_graph *graph;
   const double *normals;
   const size_t *piece;
   size_t pieces;
-  cell *cells;
+  cell *cells;                 /* those of each piece behind its root; the roots come first */
+  size_t *members;             /* [count] points by their pieces, in the order of the points within each */
   size_t *places, place_count; /* points t */
   double *weights;             /* [places] A_t */
   double *w;                   /* [places][pieces] sqrt(A_t) W */
   size_t first;
 } gauss;
 
+/* Sorts the points by their pieces: the roots of the pieces' trees. */
+static void plant_trees(gauss *t) {
+  for (size_t p = 0; p < t->pieces; p++) t->cells[p] = (cell){0};
+  for (size_t i = 0; i < t->graph->count; i++)
+    if (t->piece[i] != NONE) t->cells[t->piece[i]].high++;
+  for (size_t p = 1; p < t->pieces; p++) t->cells[p].high += t->cells[p - 1].high;
+  for (size_t p = 0; p < t->pieces; p++) t->cells[p].low = t->cells[p].high;
+  for (size_t i = t->graph->count; i-- > 0;) /* low walks down to the piece's begin */
+    if (t->piece[i] != NONE) t->members[--t->cells[t->piece[i]].low] = i;
+}
+
+static double distance(unsigned n, const double *a, const double *b) {
+  double square = 0;
+  for (unsigned d = 0; d < n; d++) square += (a[d] - b[d]) * (a[d] - b[d]);
+  return sqrt(square);
+}
+
+/* What the points of a leaf, or the two children, come to. */
+static void sum_up(const gauss *t, cell *k) {
+  const batten_orient_graph *g = t->graph;
+  unsigned n = g->n;
+  const cell *children = t->cells + k->left;
+  for (size_t q = k->low; q < k->high && !k->left; q++) {
+    size_t i = t->members[q];
+    k->area += g->area[i];
+    for (unsigned d = 0; d < n; d++) {
+      k->middle[d] += g->area[i] * g->surface[i * n + d];
+      k->dipole[d] += g->area[i] * t->normals[i * n + d];
+    }
+  }
+  for (const cell *child = children; k->left && child < children + 2; child++) {
+    k->area += child->area;
+    for (unsigned d = 0; d < n; d++) {
+      k->middle[d] += child->area * child->middle[d];
+      k->dipole[d] += child->dipole[d];
+    }
+  }
+  for (unsigned d = 0; k->area > 0 && d < n; d++) k->middle[d] /= k->area;
+  for (size_t q = k->low; q < k->high && !k->left; q++)
+    k->radius = fmax(k->radius, distance(n, g->surface + t->members[q] * n, k->middle));
+  for (const cell *child = children; k->left && child < children + 2; child++)
+    k->radius = fmax(k->radius, child->radius + distance(n, child->middle, k->middle));
+}
+
 static void lay_cells(gauss *t) {
-  size_t count = 1;
-  t->cells[0] = (cell){.low = 0, .high = t->graph->count};
+  plant_trees(t);
+  size_t count = t->pieces;
   for (size_t c = 0; c < count; c++) {
     size_t low = t->cells[c].low, high = t->cells[c].high, mid = low + (high - low) / 2;
     if (high - low <= LEAF) continue;
@@ -65,43 +110,7 @@ static void lay_cells(gauss *t) {
     t->cells[count++] = (cell){.low = low, .high = mid};
     t->cells[count++] = (cell){.low = mid, .high = high};
   }
-  const batten_orient_graph *g = t->graph;
-  unsigned n = g->n;
-  for (size_t c = count; c-- > 0;) { /* children come behind their parents */
-    cell *k = t->cells + c;
-    k->piece = NONE;
-    for (size_t i = k->low; !k->left && i < k->high; i++) {
-      if (t->piece[i] == NONE) continue;
-      k->piece = k->piece == NONE || k->piece == t->piece[i] ? t->piece[i] : MIXED;
-      k->area += g->area[i];
-      for (unsigned d = 0; d < n; d++) {
-        k->middle[d] += g->area[i] * g->surface[i * n + d];
-        k->dipole[d] += g->area[i] * t->normals[i * n + d];
-      }
-    }
-    for (const cell *child = t->cells + k->left; k->left && child < t->cells + k->left + 2; child++) {
-      if (child->piece == NONE) continue;
-      k->piece = k->piece == NONE || k->piece == child->piece ? child->piece : MIXED;
-      k->area += child->area;
-      for (unsigned d = 0; d < n; d++) {
-        k->middle[d] += child->area * child->middle[d];
-        k->dipole[d] += child->dipole[d];
-      }
-    }
-    for (unsigned d = 0; k->area > 0 && d < n; d++) k->middle[d] /= k->area;
-    for (size_t i = k->low; i < k->high && !k->left; i++) {
-      double square = 0;
-      for (unsigned d = 0; d < n; d++)
-        square += (g->surface[i * n + d] - k->middle[d]) * (g->surface[i * n + d] - k->middle[d]);
-      if (t->piece[i] != NONE) k->radius = fmax(k->radius, sqrt(square));
-    }
-    for (const cell *child = t->cells + k->left; k->left && child < t->cells + k->left + 2; child++) {
-      double square = 0;
-      for (unsigned d = 0; d < n; d++)
-        square += (child->middle[d] - k->middle[d]) * (child->middle[d] - k->middle[d]);
-      if (child->piece != NONE) k->radius = fmax(k->radius, child->radius + sqrt(square));
-    }
-  }
+  for (size_t c = count; c-- > 0;) sum_up(t, t->cells + c); /* children come behind their parents */
 }
 
 /* A dipole's part in w. core: squared radius of what it stands for, so that a near point counts no more than its disk
@@ -113,48 +122,51 @@ static double part(unsigned n, const double *dipole, const double *e, double squ
   return n == 2 ? flux / (6.283185307179586 * square) : flux / (12.566370614359172 * square * sqrt(square));
 }
 
-static void add_place(const gauss *t, size_t place) {
+/* What piece p adds at point `self`. */
+static double of_piece(const gauss *t, size_t p, size_t self) {
   const batten_orient_graph *g = t->graph;
   unsigned n = g->n;
-  size_t self = t->places[place], stack[DEPTH], top = 0;
+  size_t stack[DEPTH], top = 0;
   const double *x = g->surface + self * n;
-  double *row = t->w + place * t->pieces, root = sqrt(t->weights[place]);
-  memset(row, 0, t->pieces * sizeof *row);
-  stack[top++] = 0;
+  double sum = 0;
+  stack[top++] = p;
   while (top > 0) {
     const cell *k = t->cells + stack[--top];
     double e[3], square = 0;
-    if (k->piece == NONE) continue;
     for (unsigned c = 0; c < n; c++) {
       e[c] = k->middle[c] - x[c];
       square += e[c] * e[c];
     }
-    if (k->piece != MIXED && k->radius * k->radius < FAR * FAR * square) {
-      row[k->piece] += part(n, k->dipole, e, square, 0);
+    if (k->radius * k->radius < FAR * FAR * square) {
+      sum += part(n, k->dipole, e, square, 0);
     } else if (k->left) {
       stack[top++] = k->left;
       stack[top++] = k->left + 1;
     } else {
-      for (size_t i = k->low; i < k->high; i++) {
-        if (i == self || t->piece[i] == NONE) continue;
+      for (size_t q = k->low; q < k->high; q++) {
+        size_t i = t->members[q];
+        if (i == self) continue;
         square = 0;
         for (unsigned c = 0; c < n; c++) {
           e[c] = g->surface[i * n + c] - x[c];
           square += e[c] * e[c];
         }
-        double size = n == 2 ? g->area[i] / 2 : sqrt(g->area[i] / 3.141592653589793);
-        if (square > 0) row[t->piece[i]] += g->area[i] * part(n, t->normals + i * n, e, square, size * size);
+        double core = n == 2 ? g->area[i] * g->area[i] / 4 : g->area[i] / 3.141592653589793;
+        if (square > 0) sum += g->area[i] * part(n, t->normals + i * n, e, square, core);
       }
     }
   }
-  for (size_t p = 0; p < t->pieces; p++) row[p] *= root;
+  return sum;
 }
 
 static void add_places(void *task, size_t chunk) {
   const gauss *t = task;
   size_t begin = t->first + chunk * CHUNK,
          slice = t->first + SLICE < t->place_count ? t->first + SLICE : t->place_count;
-  for (size_t p = begin; p < begin + CHUNK && p < slice; p++) add_place(t, p);
+  for (size_t place = begin; place < begin + CHUNK && place < slice; place++) {
+    double root = sqrt(t->weights[place]);
+    for (size_t p = 0; p < t->pieces; p++) t->w[place * t->pieces + p] = root * of_piece(t, p, t->places[place]);
+  }
 }
 
 /* Every so many points of a piece one, which stands for the area of all since the last. of_piece [pieces][3] scratch:
@@ -246,19 +258,21 @@ batten_status batten_orient_gauss(batten_context *ctx, const batten_orient_graph
   signed char *trial = NULL;
   batten_status status = BATTEN_E_NOMEM;
   most += (PLACES_OF_PIECE + 1) * M;
-  /* halves of ranges of more than LEAF points: leaves hold more than LEAF / 2 */
-  if (!(t.cells = batten_alloc_array(ctx, 4 * (g->count / LEAF) + 4, sizeof *t.cells)) ||
+  /* halves of ranges of more than LEAF points: leaves hold LEAF / 2 or more, but for pieces that are one */
+  if (!(t.cells = batten_alloc_array(ctx, 4 * (g->count / LEAF + 1) + M, sizeof *t.cells)) ||
+      !(t.members = batten_alloc_array(ctx, g->count, sizeof *t.members)) ||
       !(t.places = batten_alloc_array(ctx, most, sizeof *t.places)) ||
       !(t.weights = batten_alloc_array(ctx, most, sizeof *t.weights)) ||
       !(t.w = batten_alloc_array(ctx, most, M * sizeof *t.w)) ||
       !(matrix = batten_alloc_array(ctx, M, M * sizeof *matrix)) ||
       !(h = batten_alloc_array(ctx, M, 3 * sizeof *h)) || !(trial = batten_alloc(ctx, M)))
     goto done;
-  if ((status = batten_progress(ctx, "orient", 0.9)) < 0) goto done;
+  if ((status = batten_progress(ctx, "orient", 0.91)) < 0) goto done;
   lay_cells(&t);
   choose_places(&t, (g->count + PLACES - 1) / PLACES, h);
   for (; t.first < t.place_count; t.first += SLICE) {
-    if ((status = batten_progress(ctx, "orient", 0.92)) < 0) goto done;
+    if ((status = batten_progress(ctx, "orient", 0.92 + 0.05 * (double)t.first / (double)t.place_count)) < 0)
+      goto done;
     batten_parallel(ctx, SLICE / CHUNK, add_places, &t);
   }
   double *slope = h + M, *area = slope + M;
@@ -279,6 +293,7 @@ done:
   batten_free(ctx, t.w);
   batten_free(ctx, t.weights);
   batten_free(ctx, t.places);
+  batten_free(ctx, t.members);
   batten_free(ctx, t.cells);
   return status;
 }

@@ -1,9 +1,8 @@
 /* Neighbours, and what normals of neighbours say about each other.
  *
- * Two normals are
- * compared after reflection in the bisector plane of their points (after Koenig and Gumhold 2009, "Consistent
- * propagation of normal orientations"): a plain scalar product calls the two sides of a rim alike or unalike by
- * chance. */
+ * Two normals are compared after reflection in the bisector plane of their points (after Koenig and Gumhold 2009,
+ * "Consistent propagation of normal orientations"): a plain scalar product calls the two sides of a rim alike or
+ * unalike by chance. */
 #include "orient.h"
 
 #include <math.h>
@@ -31,7 +30,7 @@ void batten_orient_graph_free(batten_context *ctx, batten_orient_graph *g) {
 }
 
 batten_status batten_orient_graph_new(batten_context *ctx, unsigned n, size_t count, const double *points, bool adapt,
-                                      batten_orient_graph *graph) {
+                                      double part, batten_orient_graph *graph) {
   size_t k = n == 3 ? NEIGHBOURS_3D : NEIGHBOURS_2D, pairs;
   if (k > count - 1) k = count - 1;
   if (!batten_mul(count, k, &pairs)) return batten_fail(ctx, BATTEN_E_TOO_LARGE, "count: %zu points", count);
@@ -46,7 +45,7 @@ batten_status batten_orient_graph_new(batten_context *ctx, unsigned n, size_t co
       !(g.area = batten_alloc_array(ctx, count, sizeof *g.area)))
     goto done;
   if ((status = batten_tree_new(ctx, n, count, points, &tree)) < 0) goto done;
-  status = batten_orient_fit_planes(ctx, tree, adapt, &g);
+  status = batten_orient_fit_planes(ctx, tree, adapt, part, &g);
 done:
   batten_tree_free(ctx, tree);
   if (status < 0) batten_orient_graph_free(ctx, &g);

@@ -18,7 +18,7 @@
 #include "basis/eigen3.h"
 #include "orient.h"
 
-enum { CHUNK = 256, SLICE = 128 * CHUNK, WIDE = 64, WIDEST = 160 };
+enum { CHUNK = 256, SLICE = 32 * CHUNK, WIDE = 64, WIDEST = 160 };
 /* Neighbours that spread over less than this part of their length lie on a scan line or contour: no plane. */
 static const double THREAD = 0.3;
 /* Thickness over width up to which a plane is taken as it is: 10 neighbours then give its direction to 7 degrees. */
@@ -157,11 +157,11 @@ static void fit_planes(void *task, size_t chunk) {
   }
 }
 
-batten_status batten_orient_fit_planes(batten_context *ctx, const batten_tree *tree, bool adapt,
+batten_status batten_orient_fit_planes(batten_context *ctx, const batten_tree *tree, bool adapt, double part,
                                        batten_orient_graph *g) {
   for (size_t first = 0; first < g->count; first += SLICE) {
     size_t last = first + SLICE < g->count ? first + SLICE : g->count;
-    batten_status status = batten_progress(ctx, "orient", 0.3 * (double)first / (double)g->count);
+    batten_status status = batten_progress(ctx, "orient", part + 0.2 * (double)first / (double)g->count);
     if (status < 0) return status;
     batten_parallel(ctx, (last - first + CHUNK - 1) / CHUNK, fit_planes, &(plane_task){g, tree, adapt, first, last});
   }

@@ -84,11 +84,12 @@ static void remember(const batten_orient_system *s, const double *g, const doubl
   project(s->n, s->count, w->next, step);
   project(s->n, s->count, w->next, change);
   double curvature = dot(w->size, step, change);
-  if (curvature <= 1e-12 * sqrt(dot(w->size, step, step) * dot(w->size, change, change))) return;
-  if (w->pairs < MEMORY)
+  bool full = w->pairs == MEMORY; /* then the oldest has been overwritten */
+  if (full) w->oldest = (w->oldest + 1) % MEMORY;
+  if (!(curvature > 1e-12 * sqrt(dot(w->size, step, step) * dot(w->size, change, change))))
+    w->pairs -= full;
+  else if (!full)
     w->pairs++;
-  else
-    w->oldest = (w->oldest + 1) % MEMORY;
 }
 
 static void find_slope(const batten_orient_system *s, const double *g, const double *mg, double *slope) {

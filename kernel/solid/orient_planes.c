@@ -11,8 +11,8 @@
 #include "base/checked.h"
 #include "orient.h"
 
-/* Pieces that are looked at between two looks at the host. */
-enum { SLICE = 64 };
+/* Pieces, and points of pieces, that are looked at between two looks at the host. */
+enum { SLICE = 64, POINTS = 1 << 17 };
 
 /* Planes turned as the forest says; piece [count]: label of each point's component, numbered by first point. Returns
  * how many. */
@@ -33,16 +33,19 @@ static size_t turn_planes(const batten_orient_graph *g, batten_orient_forest *f,
 typedef struct box {
   double lower[3], upper[3];
   size_t extreme; /* a point of the component on its box: inside no part of its own */
+  bool strays;    /* of these alone */
 } box;
 
 static void find_boxes(const batten_orient_graph *g, size_t pieces, const size_t *piece, box *boxes) {
   unsigned n = g->n;
   for (size_t p = 0; p < pieces; p++)
-    boxes[p] = (box){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}, 0};
+    boxes[p] = (box){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}, 0, true};
+  for (size_t i = 0; i < g->count; i++)
+    if (g->area[i] > 0) boxes[piece[i]].strays = false;
   for (size_t i = 0; i < g->count; i++) {
     box *b = boxes + piece[i];
     const double *x = g->points + i * n;
-    if (g->area[i] == 0 && b->lower[0] < INFINITY) continue; /* a stray: only where there is nothing else */
+    if (g->area[i] == 0 && !b->strays) continue; /* only where there is nothing else */
     if (x[0] < b->lower[0]) b->extreme = i;
     for (unsigned c = 0; c < n; c++) {
       b->lower[c] = fmin(b->lower[c], x[c]);
@@ -134,7 +137,13 @@ static batten_status settle_components(batten_context *ctx, const batten_orient_
   start[pieces] = g->count;
 
   find_boxes(g, pieces, piece, boxes);
+  size_t looked_at = POINTS;
   for (size_t p = 0; p < pieces; p++) {
+    if (looked_at >= POINTS) {
+      if ((status = batten_progress(ctx, "orient", 0.38)) < 0) goto done;
+      looked_at = 0;
+    }
+    looked_at += start[p + 1] - start[p];
     size_t members = drop_strays(g, start[p + 1] - start[p], order + start[p]);
     if (batten_orient_outwardness(g->n, g->points, normals, members, order + start[p]) < 0)
       turn(g, start[p], start[p + 1], order, normals);
@@ -158,7 +167,7 @@ done:
 batten_status batten_orient_planes(batten_context *ctx, const batten_orient_graph *g, batten_orient_forest *forest,
                                    double *normals) {
   size_t *piece = batten_alloc_array(ctx, g->count, sizeof *piece);
-  batten_status status = piece ? batten_orient_forest_join(ctx, g, forest, INFINITY) : BATTEN_E_NOMEM;
+  batten_status status = piece ? batten_orient_forest_join(ctx, g, forest, INFINITY, 0.35) : BATTEN_E_NOMEM;
   if (status >= 0) status = settle_components(ctx, g, turn_planes(g, forest, piece, normals), piece, normals);
   batten_free(ctx, piece);
   return status;

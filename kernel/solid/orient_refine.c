@@ -7,7 +7,7 @@
  *   1. The firmest ties alone, between planes that are sure, join the points to pieces in which the signs agree: a
  *      smooth closed surface is one piece, a plate with a rim of few points two.
  *   2. The signs of the largest pieces are those of the least misfit of Gauss's formula (orient_gauss.c), in which
- * the whole set counts at full resolution. Where that does not decide, the field's votes do.
+ *      the whole set counts at full resolution. Where that does not decide, the field's votes do.
  *   3. All other points (sharp edges, noise, thin fingers of few points) hang on by ties, the firmest first; where
  * the settled points around agree with the field, its sign counts instead.
  *   4. Where planes are unsure and the field does not contradict the sign, its direction becomes the normal's.
@@ -150,7 +150,7 @@ static batten_status hang_on(batten_context *ctx, refinement *r) {
   double *sum = NULL;
   for (size_t p = 1; p < r->pieces; p++) /* one tree of all that is settled */
     batten_orient_forest_tie(r->forest, r->member[0], r->member[p], r->signs[0] != r->signs[p]);
-  batten_status status = batten_orient_forest_join(ctx, g, r->forest, INFINITY);
+  batten_status status = batten_orient_forest_join(ctx, g, r->forest, INFINITY, 0.97);
   if (status >= 0) status = count_leftover(ctx, r, &sum);
   if (status < 0) return status;
   size_t settled = batten_orient_forest_root(r->forest, r->member[0], &opposed);
@@ -189,7 +189,7 @@ batten_status batten_orient_refine(batten_context *ctx, const batten_orient_grap
       !(r->piece = batten_alloc_array(ctx, g->count, sizeof *r->piece)) || !(r->vote = batten_alloc(ctx, g->count)))
     goto done;
   count_votes(r);
-  if ((status = batten_orient_forest_join(ctx, g, forest, FIRM)) < 0) goto done;
+  if ((status = batten_orient_forest_join(ctx, g, forest, FIRM, 0.9)) < 0) goto done;
   if ((status = find_pieces(ctx, r)) < 0) goto done;
   *done = r->pieces > 0;
   *pieces = r->pieces;

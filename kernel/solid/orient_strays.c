@@ -3,17 +3,18 @@
  * others are tied.
  *
  *   alone     its neighbours lie three times as close to each other as to it, and most of their planes miss it by
- * more than they reach (on a surface whose density changes abruptly the planes do not miss) in a fog  no
- * neighbourhood of it is flat among     most of its neighbours are strays: chance makes a neighbourhood in a fog look
- * flat now and then
+ *             more than they reach (on a surface whose density changes abruptly the planes do not miss)
+ *   in a fog  no neighbourhood of it is flat
+ *   among     most of its neighbours are strays: chance makes a neighbourhood in a fog look flat now and then
  *
- * Where more than a third are strays the data are rather a noisy surface, and none is. */
+ * Where more than a third are strays, or too few others would be left, the data are rather a noisy surface, and none
+ * is. */
 #include <math.h>
 
 #include "base/checked.h"
 #include "orient.h"
 
-enum { CHUNK = 1024, ROUNDS = 2, K_MAX = 16 };
+enum { CHUNK = 1024, ROUNDS = 2 };
 static const double ALONE = 3, MISSED = 1.5, FOG = 0.4;
 
 typedef struct stray_task {
@@ -67,7 +68,7 @@ batten_status batten_orient_find_strays(batten_context *ctx, batten_orient_graph
     after = t;
   }
   for (size_t i = 0; i < g->count; i++) strays += stray[i];
-  if (3 * strays <= g->count) {
+  if (3 * strays <= g->count && g->count - strays >= g->n + 2) {
     g->strays = strays;
     for (size_t i = 0; i < g->count; i++)
       if (stray[i]) g->area[i] = 0;

@@ -88,6 +88,13 @@ static void test_subset(batten_context *ctx) {
   s_torus(&s, 200, (double[3]){0}, 1, 0.35, 2, 1);
   s_orient(ctx, &s, energy, 1000, energy, 100, 95);
   s_free(&s);
+  s = s_new("ball, every point 12 times", 3); /* more than there are neighbours */
+  for (int i = 0; i < 12; i++) s_sphere(&s, 60, (double[3]){0}, 1, 1);
+  for (size_t energy_points = 40; energy_points <= 1000; energy_points *= 5) {
+    s_orient(ctx, &s, energy, energy_points, energy, 100, 100);
+    s_orient(ctx, &s, planes, energy_points, planes, 100, 100);
+  }
+  s_free(&s);
 }
 
 static void test_planes(batten_context *ctx) {

@@ -263,9 +263,9 @@ typedef struct batten_orient_info {
  *           closed as a surface (|sum of area normal| / area) by more than 0.1, and where its matrix is singular.
  *
  * Planes go through 10 (4) neighbours, above energy_points through up to 160 where noise makes these no plane: noise
- * of one spacing of the of one spacing of the points is well. Points far off the surface turn nothing. Outward:
- * extreme points look away from the rest (PLANES, and ENERGY up to energy_points). Points that coincide get the same
- * normal from ENERGY. The result does not depend on the order of the points, up to ties in distance, nor on the
+ * of one spacing of the points is well. Points far off the surface turn nothing. Outward:
+ * extreme points look away from the rest (PLANES, and ENERGY up to energy_points). Points that coincide count once
+ * and get the same normal. The result does not depend on the order of the points, up to ties in distance, nor on the
  * context's threads; with other threads of BLAS it differs by rounding. Progress phase "orient". opt NULL: defaults;
  * info may be NULL. Fails: INVALID, NOMEM, TOO_LARGE, SINGULAR (all on one line or plane), CANCELLED. */
 BATTEN_API batten_status batten_orient_points(batten_context *ctx, unsigned n, size_t count, const double *points,
