@@ -28,15 +28,16 @@ static const double QUALITY_MIN = 0.3; /* changes make no triangle worse than th
 enum { FLIP_SWEEPS = 4, VALENCE_MAX = 12 };
 
 enum { TASK_VERTICES = 4096, TASK_TRIANGLES = 4096 };
-enum { PROGRESS_STEP = 1 << 17 }; /* edges between two calls of progress, where these change */
+enum { PROGRESS_STEP = 1 << 17 }; /* edges, triangles or vertices looked at between two calls of progress */
 
 typedef struct improver {
   mesh_surface *s;
   batten_sampler *sampler;
   const double *lower, *upper; /* the box */
   double edge;
-  const char *phase; /* of progress, and how far it is at the round's beginning */
+  const char *phase; /* of progress, how far it is, and what was looked at since it was told */
   double fraction;
+  size_t looks;
   double angle;         /* of creases, 0 = there are none */
   size_t most;          /* triangles: needles that are halved across give ever more needles */
   unsigned char *flags; /* [3 T] half-edges, or [T] triangles, to be looked at */
@@ -47,7 +48,7 @@ typedef struct improver {
   bool (*wanted)(const struct improver *, uint32_t);
   unsigned char *inner; /* [V] for collapses in parts */
   uint32_t *by_part;    /* half-edges, those of a part from part_first on */
-  size_t part_first[17];
+  size_t part_first[17], part_done;
   double *target, *turned; /* [V][3] places and normals that vertices shall get, */
   unsigned char *share;    /* [V] and how much of the way: 2^-share, STAY = nothing */
   size_t room;             /* vertices that these hold */
@@ -58,6 +59,20 @@ typedef struct improver {
 static double *point(const mesh_surface *s, uint32_t v) { return s->points + 3 * (size_t)v; }
 static double *normal(const mesh_surface *s, uint32_t v) { return s->normals + 3 * (size_t)v; }
 static unsigned char box_faces(const mesh_surface *s, uint32_t v) { return s->faces[v] & (unsigned char)~MESH_MARKS; }
+
+/* ---- progress ----------------------------------------------------------------------------------- */
+
+static batten_status tell(improver *im, double fraction) {
+  im->fraction = fraction;
+  im->looks = 0;
+  return batten_progress(im->s->ctx, im->phase, fraction);
+}
+
+/* Tells again when enough was looked at since: small surfaces need no more than the steps of a round. */
+static batten_status count_looks(improver *im, size_t looks) {
+  im->looks += looks;
+  return im->looks < PROGRESS_STEP ? BATTEN_OK : tell(im, im->fraction);
+}
 
 /* ---- what a change does to a triangle ----------------------------------------------------------- */
 
@@ -132,7 +147,7 @@ static batten_status flag_edges(improver *im, bool (*wanted)(const improver *, u
   if (st < 0) return st;
   im->wanted = wanted;
   batten_parallel(im->s->ctx, (im->s->triangle_count + TASK_TRIANGLES - 1) / TASK_TRIANGLES, flag_task, im);
-  return BATTEN_OK;
+  return count_looks(im, im->s->triangle_count);
 }
 
 static batten_status touch(improver *im, uint32_t v) {
@@ -178,6 +193,7 @@ static batten_status split_long(improver *im) {
       for (int k = 0; k < 3; k++) middle[k] = 0.5 * a[k] + 0.5 * b[k];
       uint32_t m = mesh_surface_split(s, h, middle);
       st = m == MESH_NONE ? BATTEN_E_NOMEM : touch(im, m);
+      if (st >= 0) st = count_looks(im, 1);
     }
   }
   return st;
@@ -263,7 +279,11 @@ static uint32_t collapse_edge(const improver *im, uint32_t h) {
 /* Vertices whose neighbours are all in their part, of which there are PARTS by their numbers. As long as only edges
  * between such vertices and with such vertices opposite to them are collapsed, nothing that lies in another part, or
  * between parts, is read or changed; and neighbours stay in the part. */
-enum { PARTS = 16, PARTS_FROM = 1 << 17 }; /* vertices from which on it is worth it */
+enum {
+  PARTS = 16,
+  PARTS_FROM = 1 << 17, /* vertices from which on it is worth it */
+  PART_STEP = 1 << 15   /* edges of a part between two calls of progress: some tenths of a second */
+};
 
 static size_t part_of(const mesh_surface *s, uint32_t v) { return (size_t)v * PARTS / s->vertex_count; }
 
@@ -292,11 +312,28 @@ static bool is_inner(const improver *im, uint32_t h) {
 static void collapse_task(void *arg, size_t part) {
   const improver *im = arg;
   const mesh_surface *s = im->s;
-  for (size_t i = im->part_first[part]; i < im->part_first[part + 1]; i++) {
+  size_t first = im->part_first[part] + im->part_done, end = im->part_first[part + 1];
+  for (size_t i = first; i < end && i < first + PART_STEP; i++) {
     uint32_t h = im->by_part[i];
     if (s->origin[h] == MESH_NONE || !is_short(im, h) || !is_inner(im, h)) continue;
     collapse_edge(im, h);
   }
+}
+
+static batten_status collapse_by_part(improver *im) {
+  size_t longest = 0;
+  batten_status st = count_looks(im, im->part_first[PARTS]);
+  for (size_t p = 0; p < PARTS; p++) {
+    size_t count = im->part_first[p + 1] - im->part_first[p];
+    if (count > longest) longest = count;
+  }
+  if (st >= 0) batten_parallel(im->s->ctx, PARTS, inner_task, im);
+  for (im->part_done = 0; st >= 0 && im->part_done < longest; im->part_done += PART_STEP) {
+    batten_parallel(im->s->ctx, PARTS, collapse_task, im);
+    st = tell(im, im->fraction);
+  }
+  im->touched_all = true;
+  return st;
 }
 
 /* Where many edges are short, those that lie within parts of the surface, part beside part. The flags stay. */
@@ -319,14 +356,9 @@ static batten_status collapse_parts(improver *im) {
   }
   im->inner = batten_alloc_array(ctx, s->vertex_count, 1);
   im->by_part = im->inner ? batten_alloc_array(ctx, count, sizeof *im->by_part) : NULL;
-  if (im->by_part) {
-    for (uint32_t h = 0; h < half_edges; h++)
-      if (im->flags[h]) im->by_part[next[part_of(s, s->origin[h])]++] = h;
-    batten_parallel(ctx, PARTS, inner_task, im);
-    batten_parallel(ctx, PARTS, collapse_task, im);
-    im->touched_all = true;
-  }
-  batten_status st = im->by_part ? BATTEN_OK : BATTEN_E_NOMEM;
+  for (uint32_t h = 0; im->by_part && h < half_edges; h++)
+    if (im->flags[h]) im->by_part[next[part_of(s, s->origin[h])]++] = h;
+  batten_status st = im->by_part ? collapse_by_part(im) : BATTEN_E_NOMEM;
   batten_free(ctx, im->by_part);
   batten_free(ctx, im->inner);
   im->by_part = NULL;
@@ -337,12 +369,11 @@ static batten_status collapse_parts(improver *im) {
 static batten_status collapse_short(improver *im) {
   mesh_surface *s = im->s;
   batten_status st = flag_edges(im, is_short);
-  size_t looks = 0;
   if (st >= 0) st = collapse_parts(im);
-  if (st >= 0) st = batten_progress(s->ctx, im->phase, im->fraction);
+  if (st >= 0) st = tell(im, im->fraction);
   for (uint32_t h = 0; st >= 0 && h < 3 * s->triangle_count; h++) {
     if (!im->flags[h] || s->origin[h] == MESH_NONE || !is_short(im, h)) continue;
-    if (looks++ % PROGRESS_STEP == PROGRESS_STEP - 1) st = batten_progress(s->ctx, im->phase, im->fraction);
+    st = count_looks(im, 1);
     uint32_t v = st >= 0 ? collapse_edge(im, h) : MESH_NONE;
     if (v != MESH_NONE) st = touch(im, v);
   }
@@ -431,7 +462,8 @@ static batten_status flip_sweeps(improver *im) {
     next.count = 0;
     for (size_t i = 0; st >= 0 && i < now.count; i++) {
       uint32_t h = now.half_edges[i], g = s->twin[h];
-      if (!wants_flip(im, h) || !mesh_surface_may_flip(s, h)) continue;
+      st = count_looks(im, 1);
+      if (st < 0 || !wants_flip(im, h) || !mesh_surface_may_flip(s, h)) continue;
       mesh_surface_flip(s, h);
       const uint32_t around[4] = {mesh_next(h), mesh_previous(h), mesh_next(g), mesh_previous(g)};
       for (int k = 0; st >= 0 && k < 4; k++) st = list_edge(im, &next, around[k]);
@@ -684,6 +716,7 @@ static batten_status hold_back(improver *im) {
   for (int pass = 0; st >= 0 && im->listed_count > 0; pass++) {
     size_t held_count = 0, count = 0;
     batten_parallel(ctx, (im->listed_count + TASK_TRIANGLES - 1) / TASK_TRIANGLES, check_task, im);
+    st = count_looks(im, im->listed_count);
     for (size_t i = 0; st >= 0 && i < im->listed_count; i++) {
       uint32_t t = im->listed ? im->listed[i] : (uint32_t)i;
       for (uint32_t k = 0; im->flags[t] && st >= 0 && k < 3; k++) {
@@ -714,7 +747,9 @@ static batten_status smooth(improver *im, bool on_field) {
   if (st < 0) return st;
   const size_t tasks = (im->s->vertex_count + TASK_VERTICES - 1) / TASK_VERTICES;
   batten_parallel(im->s->ctx, tasks, target_task, im);
-  if (on_field) st = step_to_field(im);
+  st = count_looks(im, im->s->vertex_count);
+  if (st >= 0 && on_field) st = step_to_field(im);
+  if (st >= 0) st = count_looks(im, im->s->vertex_count);
   if (st < 0) return st;
   batten_parallel(im->s->ctx, tasks, box_task, im);
   st = hold_back(im);
@@ -737,13 +772,14 @@ static batten_status improve_round(improver *im, const char *phase, unsigned rou
   im->fraction = (double)round / of;
   batten_status st = split_long(im);
   if (st >= 0) st = collapse_short(im);
-  if (st >= 0) st = batten_progress(im->s->ctx, phase, (round + 0.3) / of);
+  if (st >= 0) st = tell(im, (round + 0.3) / of);
   if (st >= 0) st = flip_sweeps(im);
+  if (st >= 0) st = count_looks(im, im->s->triangle_count);
   if (st >= 0) st = mesh_surface_compact(im->s);
   if (st >= 0 && on_field && im->angle > 0) st = slide(im, 0.5);
-  if (st >= 0) st = batten_progress(im->s->ctx, phase, (round + 0.5) / of);
+  if (st >= 0) st = tell(im, (round + 0.5) / of);
   if (st >= 0) st = smooth(im, on_field);
-  if (st >= 0) st = batten_progress(im->s->ctx, phase, (round + 0.8) / of);
+  if (st >= 0) st = tell(im, (round + 0.8) / of);
   if (st >= 0) st = flip_sweeps(im);
   return st;
 }

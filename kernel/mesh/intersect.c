@@ -21,7 +21,8 @@ enum {
   TASK_LEAVES = 256,
   TASK_ITEMS = 8192, /* vertices or triangles */
   TASKS = 256,       /* between two calls of progress: some 0.3 s */
-  LEVELS_ALONE = 6   /* halved one level after the other, the 2^6 parts below side by side */
+  LEVELS_ALONE = 6,  /* halved one level after the other, the 2^6 parts below side by side, */
+  PARTS_STEP = 32    /* these between two calls of progress */
 };
 
 typedef struct box {
@@ -260,8 +261,9 @@ static void halve_task(void *arg, size_t j) {
 }
 
 /* All below part j of the present level, and the boxes of its leaves. */
-static void finish_task(void *arg, size_t j) {
+static void finish_task(void *arg, size_t task) {
   const search *s = arg;
+  const size_t j = s->first_task + task;
   for (unsigned level = s->level; level < s->depth; level++)
     for (size_t i = j << (level - s->level); i < (j + 1) << (level - s->level); i++) halve(s, level, i);
   for (size_t leaf = j << (s->depth - s->level); leaf < (j + 1) << (s->depth - s->level); leaf++) {
@@ -284,7 +286,13 @@ static batten_status build(batten_context *ctx, search *s) {
     st = batten_progress(ctx, "crossings", 0.05 * (1 + s->level));
   }
   if (st < 0) return st;
-  batten_parallel(ctx, (size_t)1 << s->level, finish_task, s);
+  const size_t parts = (size_t)1 << s->level;
+  for (s->first_task = 0; st >= 0 && s->first_task < parts; s->first_task += PARTS_STEP) {
+    size_t left = parts - s->first_task;
+    batten_parallel(ctx, left < PARTS_STEP ? left : PARTS_STEP, finish_task, s);
+    st = batten_progress(ctx, "crossings", 0.3 + 0.1 * (double)s->first_task / (double)parts);
+  }
+  if (st < 0) return st;
   for (size_t h = (size_t)1 << s->depth; h-- > 1;) {
     s->boxes[h] = s->boxes[2 * h];
     box_join(s->boxes + h, s->boxes + 2 * h + 1);

@@ -13,7 +13,8 @@ static const double DEGREES = 57.295779513082320877;
 
 typedef struct frame {
   double middle[3];
-  int exponent; /* unit = 2^exponent */
+  int exponent;    /* unit = 2^exponent */
+  double scale[2]; /* two factors whose product is 2^-exponent, which itself might overflow */
 } frame;
 
 typedef struct sums {
@@ -27,7 +28,7 @@ typedef struct sums {
 } sums;
 
 static frame box_of(const batten_mesh *mesh, batten_mesh_measures *m) {
-  frame f = {{0, 0, 0}, 0};
+  frame f = {.exponent = 0};
   for (int k = 0; k < 3; k++) {
     m->lower[k] = mesh->triangle_count ? INFINITY : 0;
     m->upper[k] = mesh->triangle_count ? -INFINITY : 0;
@@ -45,11 +46,13 @@ static frame box_of(const batten_mesh *mesh, batten_mesh_measures *m) {
     size = fmax(size, 0.5 * m->upper[k] - 0.5 * m->lower[k]);
   }
   if (size > 0) frexp(size, &f.exponent);
+  f.scale[0] = ldexp(1, -f.exponent / 2);
+  f.scale[1] = ldexp(1, -f.exponent - -f.exponent / 2);
   return f;
 }
 
 static void to_frame(const frame *f, const double *p, double *out) {
-  for (int k = 0; k < 3; k++) out[k] = ldexp(p[k] - f->middle[k], -f->exponent);
+  for (int k = 0; k < 3; k++) out[k] = (p[k] - f->middle[k]) * f->scale[0] * f->scale[1];
 }
 
 static void add_integrals(const double *a, const double *b, const double *c, sums *s) {
@@ -93,15 +96,11 @@ typedef struct triangle_work {
 static void triangle_task(void *arg, size_t task) {
   const triangle_work *w = arg;
   const batten_mesh *mesh = w->mesh;
-  const double scale = ldexp(1, -w->f->exponent / 2), rest = ldexp(1, -w->f->exponent - -w->f->exponent / 2);
   sums s = {.angle_min = INFINITY, .edge_min = INFINITY};
   size_t end = (task + 1) * TASK < mesh->triangle_count ? (task + 1) * TASK : mesh->triangle_count;
   for (size_t t = task * TASK; t < end; t++) {
     double p[3][3];
-    for (size_t k = 0; k < 3; k++) {
-      const double *x = mesh->vertices + 3 * (size_t)mesh->triangles[3 * t + k];
-      for (int d = 0; d < 3; d++) p[k][d] = (x[d] - w->f->middle[d]) * scale * rest; /* one factor might overflow */
-    }
+    for (size_t k = 0; k < 3; k++) to_frame(w->f, mesh->vertices + 3 * (size_t)mesh->triangles[3 * t + k], p[k]);
     const double *corners[3] = {p[0], p[1], p[2]};
     add_integrals(p[0], p[1], p[2], &s);
     add_angles(corners, &s);
@@ -223,6 +222,7 @@ batten_status batten_mesh_measure(batten_context *ctx, const batten_mesh *mesh, 
   set_topology(&topology, mesh->triangle_count, &m);
   frame f = box_of(mesh, &m);
   st = add_triangles(ctx, mesh, &f, &s);
+  if (st >= 0) st = batten_progress(ctx, "measure", 0.9);
   if (st < 0) goto done;
   add_edges(mesh, order, &f, &s);
   set_figures(mesh, &s, &f, &m);

@@ -61,10 +61,13 @@ static batten_status pair_half_edges(mesh_surface *s, const uint32_t *order) {
                          (unsigned long)a, (unsigned long)b);
     }
   }
-  for (size_t v = 0; v < s->vertex_count; v++) s->out[v] = MESH_NONE;
-  for (uint32_t h = 0; h < half_edges; h++)
-    if (s->out[s->origin[h]] == MESH_NONE) set_first(s, h);
   return BATTEN_OK;
+}
+
+static void set_out(mesh_surface *s) {
+  for (size_t v = 0; v < s->vertex_count; v++) s->out[v] = MESH_NONE;
+  for (uint32_t h = 0; h < 3 * s->triangle_count; h++)
+    if (s->out[s->origin[h]] == MESH_NONE) set_first(s, h);
 }
 
 batten_status mesh_surface_build(batten_context *ctx, batten_rough_surface *rough, mesh_surface *out) {
@@ -85,10 +88,14 @@ batten_status mesh_surface_build(batten_context *ctx, batten_rough_surface *roug
     goto done;
   for (size_t v = 0; v < s.vertex_count; v++) s.drift[v] = INFINITY;
   memset(s.sharp, 0, 3 * s.triangle_count);
-  st = batten_mesh_sort_edges(ctx, s.vertex_count, s.triangle_count, s.origin, order);
+  st = batten_progress(ctx, "improve", 0);
+  if (st >= 0) st = batten_mesh_sort_edges(ctx, s.vertex_count, s.triangle_count, s.origin, order);
   if (st >= 0) st = batten_progress(ctx, "improve", 0);
   if (st >= 0) st = pair_half_edges(&s, order);
   if (st >= 0) st = batten_progress(ctx, "improve", 0);
+  if (st < 0) goto done;
+  set_out(&s);
+  st = batten_progress(ctx, "improve", 0);
   if (st < 0) goto done;
   set_normals(&s);
   *out = s;

@@ -550,7 +550,8 @@ static batten_status extract(tracker *tr, extraction *e) {
   e->vertex_of = batten_alloc_array(tr->ctx, tr->node_count, sizeof *e->vertex_of);
   if (!e->vertex_of) return BATTEN_E_NOMEM;
   memset(e->vertex_of, 0xff, tr->node_count * sizeof *e->vertex_of);
-  batten_status st = batten_sort_keys(tr->ctx, tr->crossed_count, tr->crossed);
+  batten_status st = batten_progress(tr->ctx, "surface", 1);
+  if (st >= 0) st = batten_sort_keys(tr->ctx, tr->crossed_count, tr->crossed);
   for (size_t i = 0; st >= 0 && i < tr->crossed_count; i++) {
     if (i % PROGRESS_STEP == 0) st = batten_progress(tr->ctx, "surface", 1);
     if (st >= 0) st = extract_one(tr, e, tr->crossed[i]);
