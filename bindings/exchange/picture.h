@@ -137,10 +137,17 @@ typedef struct picture_buffer {
 
 batten_status picture_rasterize(batten_context *ctx, const picture_scene *scene, const picture_camera *camera,
                                 picture_buffer *buffer);
+/* Vertices seen along a beam: at [V][3] their places in the map and along the beam, cells [V] codes of the cells
+ * there.
+ */
+typedef struct picture_turned {
+  float *at;
+  uint32_t *cells;
+} picture_turned;
 /* Depth of a scene seen from infinity along a direction: map [size][size] over the square [-1, 1]^2 of (u, v), holds
- * the largest coordinate along d, -2 where there is nothing. turned [vertex_count][3] is work space. */
+ * the largest coordinate along d, -2 where there is nothing; size < 2^14. turned is work space. */
 void picture_depth_map(const picture_scene *scene, const float u[3], const float v[3], const float d[3], size_t size,
-                       float *turned, float *map);
+                       picture_turned turned, float *map);
 /* Screen position in samples, and nearness. */
 void picture_project(const picture_camera *camera, unsigned samples, const float point[3], float screen[3]);
 typedef struct picture_stroke {

@@ -13,7 +13,11 @@ typedef struct fans {
   uint32_t *corners; /* [3 F] by vertex: 3 t + k */
   float *faces;      /* [F][3] unit, 0 of triangles without area */
   float *angles;     /* [3 F] at the corners */
+  const picture_scene *scene;
+  unsigned char *creased; /* [V] */
 } fans;
+
+enum { TASK = 8192 };
 
 static float dot(const float *a, const float *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
@@ -30,7 +34,16 @@ static float corner_angle(const picture_scene *s, size_t corner) {
   return isfinite(cosine) ? acosf(fmaxf(-1, fminf(1, cosine))) : 0;
 }
 
-static void fill_fans(const picture_scene *s, fans *f) {
+static void facet_task(void *arg, size_t task) {
+  const fans *f = arg;
+  const picture_scene *s = f->scene;
+  for (size_t t = task * TASK; t < s->triangle_count && t < (task + 1) * TASK; t++) {
+    picture_face_normal(s, s->triangles + 3 * t, f->faces + 3 * t);
+    for (size_t k = 0; k < 3; k++) f->angles[3 * t + k] = corner_angle(s, 3 * t + k);
+  }
+}
+
+static void fill_fans(batten_context *ctx, const picture_scene *s, fans *f) {
   const size_t corners = 3 * s->triangle_count;
   memset(f->starts, 0, (s->vertex_count + 1) * sizeof *f->starts);
   for (size_t i = 0; i < corners; i++) f->starts[s->triangles[i] + 1]++;
@@ -39,8 +52,7 @@ static void fill_fans(const picture_scene *s, fans *f) {
   /* every start is one vertex too far ahead by now */
   memmove(f->starts, f->starts + 1, s->vertex_count * sizeof *f->starts);
   f->starts[s->vertex_count] = (uint32_t)corners;
-  for (size_t t = 0; t < s->triangle_count; t++) picture_face_normal(s, s->triangles + 3 * t, f->faces + 3 * t);
-  for (size_t i = 0; i < corners; i++) f->angles[i] = corner_angle(s, i);
+  batten_parallel(ctx, (s->triangle_count + TASK - 1) / TASK, facet_task, f);
 }
 
 static bool is_parted(const fans *f, uint32_t a, uint32_t b) {
@@ -54,6 +66,12 @@ static bool has_crease(const fans *f, size_t v) {
     for (uint32_t j = first; j < i; j++)
       if (is_parted(f, f->corners[i], f->corners[j])) return true;
   return false;
+}
+
+static void crease_task(void *arg, size_t task) {
+  const fans *f = arg;
+  for (size_t v = task * TASK; v < f->scene->vertex_count && v < (task + 1) * TASK; v++)
+    f->creased[v] = has_crease(f, v);
 }
 
 static void part_normals(const fans *f, size_t v, uint32_t at, uint32_t *corners, float *normals) {
@@ -70,7 +88,7 @@ static void part_normals(const fans *f, size_t v, uint32_t at, uint32_t *corners
 
 batten_status picture_part_normals(batten_context *ctx, picture_scene *s) {
   const size_t V = s->vertex_count, corners = 3 * s->triangle_count;
-  fans f = {0};
+  fans f = {.scene = s};
   float *normals = NULL;
   uint32_t *of_corners = NULL, extra = 0;
   batten_status st = BATTEN_E_NOMEM;
@@ -78,12 +96,15 @@ batten_status picture_part_normals(batten_context *ctx, picture_scene *s) {
   if (!(f.starts = batten_alloc_array(ctx, V + 1, sizeof *f.starts)) ||
       !(f.corners = batten_alloc_array(ctx, corners, sizeof *f.corners)) ||
       !(f.faces = batten_alloc_array(ctx, s->triangle_count, 3 * sizeof *f.faces)) ||
-      !(f.angles = batten_alloc_array(ctx, corners, sizeof *f.angles)))
+      !(f.angles = batten_alloc_array(ctx, corners, sizeof *f.angles)) ||
+      !(f.creased = batten_alloc_array(ctx, V, 1)))
     goto done;
-  fill_fans(s, &f);
+  fill_fans(ctx, s, &f);
+  st = batten_progress(ctx, "picture", 0);
+  if (st < 0) goto done;
+  batten_parallel(ctx, (V + TASK - 1) / TASK, crease_task, &f);
   for (size_t v = 0; v < V; v++)
-    if (has_crease(&f, v)) extra += f.starts[v + 1] - f.starts[v];
-  st = BATTEN_OK;
+    if (f.creased[v]) extra += f.starts[v + 1] - f.starts[v];
   if (extra == 0) goto done;
   of_corners = batten_alloc_array(ctx, corners, sizeof *of_corners);
   normals = batten_alloc_array(ctx, V + extra, 3 * sizeof *normals);
@@ -97,7 +118,7 @@ batten_status picture_part_normals(batten_context *ctx, picture_scene *s) {
   memcpy(of_corners, s->triangles, corners * sizeof *of_corners);
   uint32_t at = (uint32_t)V;
   for (size_t v = 0; v < V; v++) {
-    if (!has_crease(&f, v)) continue;
+    if (!f.creased[v]) continue;
     part_normals(&f, v, at, of_corners, normals);
     at += f.starts[v + 1] - f.starts[v];
   }
@@ -105,6 +126,7 @@ batten_status picture_part_normals(batten_context *ctx, picture_scene *s) {
   s->normals = normals;
   s->normal_of = of_corners;
 done:
+  batten_free(ctx, f.creased);
   batten_free(ctx, f.angles);
   batten_free(ctx, f.faces);
   batten_free(ctx, f.corners);

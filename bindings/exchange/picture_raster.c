@@ -1,8 +1,10 @@
 /* Visibility: which triangle or dot is seen in each sample of the picture, and depth maps for the lights.
  *
  * Both walk the pixels of a triangle's bounding box with three edge functions; the nearer wins. The picture is cut
- * into bands of rows, one task each; each band looks at all triangles in order, so ties go the same way for any
- * number of threads. 1/distance is linear on the screen, distance is not: the buffer keeps 1/distance. */
+ * into bands of rows, one task each; each band has a list of what reaches it, in order, so ties go the same way for
+ * any number of threads. 1/distance is linear on the screen, distance is not: the buffer keeps 1/distance. Of meshes
+ * with far more triangles than pixels, most triangles lie between the centres of pixels: these are found out early.
+ */
 #include "picture.h"
 
 #include <math.h>
@@ -11,10 +13,19 @@
 
 enum { BAND_ROWS = 64 };
 
+/* First and last band that an item reaches; first > last: none. */
+typedef struct band_range {
+  uint16_t first, last;
+} band_range;
+
 typedef struct raster_job {
   const picture_scene *scene;
   const picture_camera *camera;
   picture_buffer *buffer;
+  size_t bands;
+  band_range *ranges; /* [items], triangles and then dots */
+  size_t *starts;     /* [bands + 1] into items */
+  uint32_t *items;    /* those of each band, in order */
 } raster_job;
 
 /* ---- projection ---------------------------------------------------------------------------------- */
@@ -105,13 +116,20 @@ static void draw_triangle(const target *t, const float *a, const float *b, const
 
 /* ---- dots: balls, seen as discs ------------------------------------------------------------------ */
 
+/* Its place on the screen and radius in samples; false: far off the mesh, behind the camera or in its face. */
+static bool see_dot(const raster_job *job, size_t index, float p[3], double *radius) {
+  const picture_scene *s = job->scene;
+  picture_project(job->camera, job->buffer->samples, s->dots + 3 * index, p);
+  *radius = s->dot_radius * job->camera->focal * p[2] * job->buffer->samples;
+  return p[2] > 0 && p[2] < 2;
+}
+
 static void draw_dot(const raster_job *job, const target *t, size_t index) {
   const picture_scene *s = job->scene;
   float p[3];
-  picture_project(job->camera, job->buffer->samples, s->dots + 3 * index, p);
-  if (!(p[2] > 0 && p[2] < 2)) return; /* far off the mesh: behind the camera, or in its face */
-  double radius = s->dot_radius * job->camera->focal * p[2] * job->buffer->samples;
+  double radius;
   size_t x0, x1, y0, y1;
+  if (!see_dot(job, index, p, &radius)) return;
   cells_within(p[0] - radius, p[0] + radius, 0, t->width, &x0, &x1);
   cells_within(p[1] - radius, p[1] + radius, t->row_first, t->row_end, &y0, &y1);
   for (size_t y = y0; y < y1; y++)
@@ -126,44 +144,128 @@ static void draw_dot(const raster_job *job, const target *t, size_t index) {
     }
 }
 
-static void draw_band(void *arg, size_t band) {
+/* ---- bands of rows ------------------------------------------------------------------------------- */
+
+static const float *screen_of(const picture_buffer *b, uint32_t v) { return b->screen + 3 * (size_t)v; }
+
+/* Of an item within [x_low, x_high] x [y_low, y_high] of the screen. */
+static band_range range_of(const raster_job *job, double x_low, double x_high, double y_low, double y_high) {
+  size_t x0, x1, y0, y1;
+  cells_within(x_low, x_high, 0, job->buffer->width, &x0, &x1);
+  cells_within(y_low, y_high, 0, job->buffer->height, &y0, &y1);
+  if (x0 >= x1 || y0 >= y1) return (band_range){1, 0};
+  return (band_range){(uint16_t)(y0 / BAND_ROWS), (uint16_t)((y1 - 1) / BAND_ROWS)};
+}
+
+static band_range triangle_range(const raster_job *job, size_t f) {
+  const uint32_t *v = job->scene->triangles + 3 * f;
+  const float *a = screen_of(job->buffer, v[0]), *b = screen_of(job->buffer, v[1]), *c = screen_of(job->buffer, v[2]);
+  return range_of(job, least(a[0], b[0], c[0]), most(a[0], b[0], c[0]), least(a[1], b[1], c[1]),
+                  most(a[1], b[1], c[1]));
+}
+
+static band_range dot_range(const raster_job *job, size_t index) {
+  float p[3];
+  double radius;
+  if (!see_dot(job, index, p, &radius)) return (band_range){1, 0};
+  return range_of(job, p[0] - radius, p[0] + radius, p[1] - radius, p[1] + radius);
+}
+
+enum { RANGE_CHUNK = 8192 };
+
+static void range_chunk(void *arg, size_t chunk) {
   raster_job *job = arg;
+  const size_t triangles = job->scene->triangle_count, items = triangles + job->scene->dot_count;
+  for (size_t i = chunk * RANGE_CHUNK; i < items && i < (chunk + 1) * RANGE_CHUNK; i++)
+    job->ranges[i] = i < triangles ? triangle_range(job, i) : dot_range(job, i - triangles);
+}
+
+/* The list of each band. */
+static batten_status sort_items(batten_context *ctx, raster_job *job) {
+  const size_t count = job->scene->triangle_count + job->scene->dot_count;
+  job->ranges = batten_alloc_array(ctx, count, sizeof *job->ranges);
+  job->starts = batten_alloc_array(ctx, job->bands + 1, sizeof *job->starts);
+  if (!job->ranges || !job->starts) return BATTEN_E_NOMEM;
+  batten_parallel(ctx, (count + RANGE_CHUNK - 1) / RANGE_CHUNK, range_chunk, job);
+  memset(job->starts, 0, (job->bands + 1) * sizeof *job->starts);
+  for (size_t i = 0; i < count; i++)
+    for (size_t b = job->ranges[i].first; b <= job->ranges[i].last; b++) job->starts[b + 1]++;
+  for (size_t b = 0; b < job->bands; b++) job->starts[b + 1] += job->starts[b];
+  job->items = batten_alloc_array(ctx, job->starts[job->bands], sizeof *job->items);
+  if (!job->items) return BATTEN_E_NOMEM;
+  for (size_t i = 0; i < count; i++)
+    for (size_t b = job->ranges[i].first; b <= job->ranges[i].last; b++) job->items[job->starts[b]++] = (uint32_t)i;
+  for (size_t b = job->bands; b > 0; b--) job->starts[b] = job->starts[b - 1]; /* each was moved to the next one's */
+  job->starts[0] = 0;
+  return BATTEN_OK;
+}
+
+static void draw_band(void *arg, size_t band) {
+  const raster_job *job = arg;
   const picture_scene *s = job->scene;
   picture_buffer *b = job->buffer;
   target t = {.width = b->width, .row_first = band * BAND_ROWS, .depth = b->nearness, .item = b->item};
   t.row_end = t.row_first + BAND_ROWS < b->height ? t.row_first + BAND_ROWS : b->height;
   memset(b->nearness + t.row_first * b->width, 0, (t.row_end - t.row_first) * b->width * sizeof *b->nearness);
-  for (size_t f = 0; f < s->triangle_count; f++) {
-    const uint32_t *v = s->triangles + 3 * f;
-    draw_triangle(&t, b->screen + 3 * (size_t)v[0], b->screen + 3 * (size_t)v[1], b->screen + 3 * (size_t)v[2],
-                  (uint32_t)f);
+  for (size_t i = job->starts[band]; i < job->starts[band + 1]; i++) {
+    const uint32_t item = job->items[i], *v = s->triangles + 3 * (size_t)item;
+    if (item < s->triangle_count)
+      draw_triangle(&t, screen_of(b, v[0]), screen_of(b, v[1]), screen_of(b, v[2]), item);
+    else
+      draw_dot(job, &t, item - s->triangle_count);
   }
-  for (size_t i = 0; i < s->dot_count; i++) draw_dot(job, &t, i);
 }
 
 batten_status picture_rasterize(batten_context *ctx, const picture_scene *scene, const picture_camera *camera,
                                 picture_buffer *buffer) {
-  raster_job job = {scene, camera, buffer};
+  raster_job job = {scene, camera, buffer, .bands = (buffer->height + BAND_ROWS - 1) / BAND_ROWS};
   batten_parallel(ctx, (scene->vertex_count + PROJECT_CHUNK - 1) / PROJECT_CHUNK, project_chunk, &job);
   batten_status st = picture_progress(ctx, scene, 0.05);
-  if (st < 0) return st;
-  batten_parallel(ctx, (buffer->height + BAND_ROWS - 1) / BAND_ROWS, draw_band, &job);
-  return picture_progress(ctx, scene, 0.2);
+  if (st >= 0) st = sort_items(ctx, &job);
+  if (st >= 0) st = picture_progress(ctx, scene, 0.1);
+  if (st >= 0) {
+    batten_parallel(ctx, job.bands, draw_band, &job);
+    st = picture_progress(ctx, scene, 0.2);
+  }
+  batten_free(ctx, job.items);
+  batten_free(ctx, job.starts);
+  batten_free(ctx, job.ranges);
+  return st;
+}
+
+/* ---- depth maps ---------------------------------------------------------------------------------- */
+
+/* 2 i for the centre of cell i, an odd number between the centres: a triangle whose corners have one odd number in
+ * common has no centre within. */
+static uint32_t cell_code(float x, double size) {
+  double a = x - 0.5;
+  if (!(a > -0.5)) a = -0.5; /* beyond the map, or no number */
+  if (a > size - 0.5) a = size - 0.5;
+  int32_t below = (int32_t)(a + 1);
+  return 2 * (uint32_t)below + ((double)below != a + 1);
+}
+
+static uint32_t is_between(uint32_t a, uint32_t b, uint32_t c) {
+  uint32_t differ = (a ^ b) | (a ^ c);
+  return (a & (uint32_t) !(differ & 0xffff)) | (a >> 16 & (uint32_t) !(differ >> 16)); /* one branch, as above */
 }
 
 void picture_depth_map(const picture_scene *s, const float u[3], const float v[3], const float d[3], size_t size,
-                       float *turned, float *map) {
+                       picture_turned turned, float *map) {
   for (size_t i = 0; i < size * size; i++) map[i] = -2;
   for (size_t i = 0; i < s->vertex_count; i++) {
     const float *p = s->vertices + 3 * i;
-    turned[3 * i] = (u[0] * p[0] + u[1] * p[1] + u[2] * p[2] + 1) * 0.5f * (float)size;
-    turned[3 * i + 1] = (v[0] * p[0] + v[1] * p[1] + v[2] * p[2] + 1) * 0.5f * (float)size;
-    turned[3 * i + 2] = d[0] * p[0] + d[1] * p[1] + d[2] * p[2];
+    float *q = turned.at + 3 * i;
+    q[0] = (u[0] * p[0] + u[1] * p[1] + u[2] * p[2] + 1) * 0.5f * (float)size;
+    q[1] = (v[0] * p[0] + v[1] * p[1] + v[2] * p[2] + 1) * 0.5f * (float)size;
+    q[2] = d[0] * p[0] + d[1] * p[1] + d[2] * p[2];
+    turned.cells[i] = cell_code(q[0], (double)size) | cell_code(q[1], (double)size) << 16;
   }
   target t = {.width = size, .row_end = size, .depth = map};
   for (size_t f = 0; f < s->triangle_count; f++) {
     const uint32_t *corner = s->triangles + 3 * f;
-    draw_triangle(&t, turned + 3 * (size_t)corner[0], turned + 3 * (size_t)corner[1], turned + 3 * (size_t)corner[2],
-                  0);
+    if (is_between(turned.cells[corner[0]], turned.cells[corner[1]], turned.cells[corner[2]])) continue;
+    draw_triangle(&t, turned.at + 3 * (size_t)corner[0], turned.at + 3 * (size_t)corner[1],
+                  turned.at + 3 * (size_t)corner[2], 0);
   }
 }

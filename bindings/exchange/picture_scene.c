@@ -168,6 +168,8 @@ static batten_status scene_make(batten_context *ctx, picture_view *view) {
   if (st < 0) goto done;
   s->period = (float)(o->color_upper - o->color_lower);
   fill_scene(&view->ball, mesh, o, normals, s);
+  st = batten_progress(ctx, "picture", 0);
+  if (st < 0) goto done;
   st = o->normals ? BATTEN_OK : picture_part_normals(ctx, s);
 done:
   batten_free(ctx, normals);

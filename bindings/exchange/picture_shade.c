@@ -48,10 +48,10 @@ typedef struct shading {
   beam beams[BEAMS];
   size_t beam_first, beam_end; /* the batch at work */
   float taps[TAPS][2];
-  float *maps;        /* [BATCH][map][map] */
-  float *turned;      /* [BATCH][vertex_count][3] vertices in a beam's frame */
-  size_t map, ground; /* sides of the batch's depth maps and of the ground's grid */
-  float reach;        /* half the side of the ground's grid */
+  float *maps;           /* [BATCH][map][map] */
+  picture_turned turned; /* [BATCH][vertex_count] vertices in a beam's frame */
+  size_t map, ground;    /* sides of the batch's depth maps and of the ground's grid */
+  float reach;           /* half the side of the ground's grid */
 } shading;
 
 /* ---- vectors ------------------------------------------------------------------------------------- */
@@ -278,8 +278,9 @@ static void fill_row(void *arg, size_t y) {
 static void fill_map(void *arg, size_t index) {
   shading *s = arg;
   const beam *b = &s->beams[s->beam_first + index];
-  picture_depth_map(s->scene, b->u, b->v, b->d, s->map, s->turned + 3 * index * s->scene->vertex_count,
-                    s->maps + index * s->map * s->map);
+  const size_t first = index * s->scene->vertex_count;
+  const picture_turned turned = {s->turned.at + 3 * first, s->turned.cells + first};
+  picture_depth_map(s->scene, b->u, b->v, b->d, s->map, turned, s->maps + index * s->map * s->map);
 }
 
 /* Part of a beam that reaches p: the four texels about it, each lit or not, blended. */
@@ -444,8 +445,9 @@ batten_status picture_shade(batten_context *ctx, const picture_scene *scene, con
   s->row_first = batten_alloc_array(ctx, height + 1, sizeof *s->row_first);
   size_t fine = s->map;
   s->maps = batten_alloc_array(ctx, BATCH * fine * fine, sizeof *s->maps);
-  s->turned = batten_alloc_array(ctx, scene->vertex_count, BATCH * 3 * sizeof *s->turned);
-  if (!s->row_first || !s->maps || !s->turned) goto done;
+  s->turned.at = batten_alloc_array(ctx, scene->vertex_count, BATCH * 3 * sizeof *s->turned.at);
+  s->turned.cells = batten_alloc_array(ctx, scene->vertex_count, BATCH * sizeof *s->turned.cells);
+  if (!s->row_first || !s->maps || !s->turned.at || !s->turned.cells) goto done;
   s->row_first[0] = 0;
   batten_parallel(ctx, height, count_row, s);
   for (size_t y = 0; y < height; y++) s->row_first[y + 1] += s->row_first[y];
@@ -467,7 +469,8 @@ batten_status picture_shade(batten_context *ctx, const picture_scene *scene, con
   st = picture_progress(ctx, scene, 0.95);
 done:
   batten_free(ctx, s->points);
-  batten_free(ctx, s->turned);
+  batten_free(ctx, s->turned.cells);
+  batten_free(ctx, s->turned.at);
   batten_free(ctx, s->maps);
   batten_free(ctx, s->row_first);
   batten_free(ctx, s);

@@ -4,6 +4,7 @@
 #include "base/checked.h"
 #include "vec.h"
 
+#include <stdbool.h>
 #include <string.h>
 
 enum { FIELD_COMPONENTS_MAX = 9 }; /* a 3 x 3 tensor */
@@ -115,28 +116,58 @@ const double *batten_mesh_field(const batten_mesh *mesh, size_t index, const cha
 
 /* ---- vertex normals ----------------------------------------------------------------------------- */
 
+enum { NORMALS_TASK = 2048, NORMALS_BLOCK = 32 * NORMALS_TASK }; /* triangles; those held at a time: 3 MB */
+
+typedef struct normals_work {
+  const batten_mesh *mesh;
+  size_t first, end;   /* of the block */
+  double (*facets)[6]; /* its triangles' unit normals, 0 without area, and angles */
+} normals_work;
+
+static void facet_of(const double *const *p, double *n, double *angles) {
+  double sides[2][3];
+  vec_sub(p[1], p[0], sides[0]);
+  vec_sub(p[2], p[0], sides[1]);
+  /* Unit sides first: their product neither over- nor underflows. */
+  bool turned = vec_normalize(sides[0]) && vec_normalize(sides[1]);
+  vec_cross(sides[0], sides[1], n);
+  if (!turned || !vec_normalize(n)) n[0] = n[1] = n[2] = 0;
+  for (int k = 0; k < 3; k++) angles[k] = vec_angle(p[k], p[(k + 1) % 3], p[(k + 2) % 3]);
+}
+
+static void facets_task(void *arg, size_t task) {
+  const normals_work *w = arg;
+  size_t first = w->first + task * NORMALS_TASK;
+  size_t end = first + NORMALS_TASK < w->end ? first + NORMALS_TASK : w->end;
+  for (size_t t = first; t < end; t++) {
+    const double *p[3];
+    for (size_t k = 0; k < 3; k++) p[k] = w->mesh->vertices + 3 * (size_t)w->mesh->triangles[3 * t + k];
+    facet_of(p, w->facets[t - w->first], w->facets[t - w->first] + 3);
+  }
+}
+
 batten_status batten_mesh_vertex_normals(batten_context *ctx, const batten_mesh *mesh, double *normals) {
   if (!ctx) return BATTEN_E_INVALID;
   if (!mesh || (!normals && mesh->vertex_count))
     return batten_fail(ctx, BATTEN_E_INVALID, "%s: NULL; give a mesh and room for its normals",
                        mesh ? "normals" : "mesh");
+  normals_work w = {.mesh = mesh};
+  const size_t triangles = mesh->triangle_count, room = triangles < NORMALS_BLOCK ? triangles : NORMALS_BLOCK;
+  w.facets = batten_alloc_array(ctx, room, sizeof *w.facets);
+  if (!w.facets) return BATTEN_E_NOMEM;
   if (mesh->vertex_count) memset(normals, 0, mesh->vertex_count * 3 * sizeof *normals);
-  for (size_t t = 0; t < mesh->triangle_count; t++) {
-    const uint32_t *v = mesh->triangles + 3 * t;
-    const double *p[3];
-    for (int k = 0; k < 3; k++) p[k] = mesh->vertices + 3 * (size_t)v[k];
-    double sides[2][3], n[3];
-    vec_sub(p[1], p[0], sides[0]);
-    vec_sub(p[2], p[0], sides[1]);
-    /* Unit sides first: their product neither over- nor underflows. */
-    if (!vec_normalize(sides[0]) || !vec_normalize(sides[1])) continue;
-    vec_cross(sides[0], sides[1], n);
-    if (!vec_normalize(n)) continue;
-    for (int k = 0; k < 3; k++) {
-      double angle = vec_angle(p[k], p[(k + 1) % 3], p[(k + 2) % 3]);
-      for (int d = 0; d < 3; d++) normals[3 * (size_t)v[k] + (size_t)d] += angle * n[d];
+  for (; w.first < triangles; w.first = w.end) {
+    w.end = triangles - w.first < NORMALS_BLOCK ? triangles : w.first + NORMALS_BLOCK;
+    batten_parallel(ctx, (w.end - w.first + NORMALS_TASK - 1) / NORMALS_TASK, facets_task, &w);
+    for (size_t t = w.first; t < w.end; t++) { /* one after the other: the sums depend on no threads */
+      const double *facet = w.facets[t - w.first];
+      for (size_t k = 0; k < 3; k++) {
+        double *n = normals + 3 * (size_t)mesh->triangles[3 * t + k];
+        for (size_t d = 0; d < 3; d++) n[d] += facet[3 + k] * facet[d];
+      }
     }
   }
   for (size_t i = 0; i < mesh->vertex_count; i++) vec_normalize(normals + 3 * i);
+  batten_free(ctx, w.facets);
   return BATTEN_OK;
 }

@@ -30,7 +30,8 @@ BATTEN_API size_t batten_mesh_field_count(const batten_mesh *mesh);
 BATTEN_API const double *batten_mesh_field(const batten_mesh *mesh, size_t index, const char **name,
                                            size_t *components);
 
-/* normals [V][3]: unit, angle-weighted; 0 at vertices without area. */
+/* normals [V][3]: unit, angle-weighted; 0 at vertices without area. Fails: INVALID, NOMEM; normals are then as before.
+ */
 BATTEN_API batten_status batten_mesh_vertex_normals(batten_context *ctx, const batten_mesh *mesh, double *normals);
 
 /* Where a quantity that is linear on triangles passes its levels: values [V] at the vertices, levels [level_count];
