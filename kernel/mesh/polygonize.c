@@ -326,6 +326,43 @@ static batten_status make_surface(batten_sampler *sampler, const batten_frame *f
   return st;
 }
 
+/* Areas are squared on the way: for cells beyond 2^+-UNIT_MAX lengths are taken in a power of two near the cell. */
+enum { UNIT_MAX = 150 };
+
+static int unit_exponent(double cell) {
+  int exponent = 0;
+  frexp(cell, &exponent);
+  return exponent > UNIT_MAX || exponent < -UNIT_MAX ? exponent : 0;
+}
+
+static void scale_values(size_t count, const double *from, int exponent, double *to) {
+  for (size_t i = 0; i < count; i++) to[i] = ldexp(from[i], exponent);
+}
+
+/* make_surface with frame and seeds in the unit 2^sampler->exponent; surface and info come back in the caller's. */
+static batten_status make_in_unit(batten_sampler *sampler, const batten_frame *frame, size_t seed_count,
+                                  const double *seeds, const batten_polygonize_options *opt, mesh_surface *surface,
+                                  batten_polygonize_info *info) {
+  const int exponent = sampler->exponent;
+  if (exponent == 0) return make_surface(sampler, frame, seed_count, seeds, opt, surface, info);
+  batten_frame scaled;
+  double *scaled_seeds = batten_alloc_array(sampler->ctx, seed_count, 3 * sizeof *scaled_seeds);
+  if (!scaled_seeds) return BATTEN_E_NOMEM;
+  scale_values(3 * seed_count, seeds, -exponent, scaled_seeds);
+  scale_values(3, frame->lower, -exponent, scaled.lower);
+  scale_values(3, frame->upper, -exponent, scaled.upper);
+  scale_values(1, &frame->diagonal, -exponent, &scaled.diagonal);
+  scale_values(1, &frame->cell, -exponent, &scaled.cell);
+  sampler->difference = BATTEN_DIFFERENCE * scaled.cell;
+  batten_status st = make_surface(sampler, &scaled, seed_count, scaled_seeds, opt, surface, info);
+  batten_free(sampler->ctx, scaled_seeds);
+  if (st < 0) return st;
+  scale_values(3 * surface->vertex_count, surface->points, exponent, surface->points);
+  scale_values(1, &info->cell, exponent, &info->cell);
+  scale_values(1, &info->distance_max, exponent, &info->distance_max);
+  return st;
+}
+
 batten_status batten_polygonize(batten_context *ctx, const batten_field *field, size_t seed_count,
                                 const double *seeds, const batten_polygonize_options *opt, batten_mesh **out,
                                 batten_polygonize_info *info) {
@@ -346,8 +383,9 @@ batten_status batten_polygonize(batten_context *ctx, const batten_field *field, 
                             .field = field,
                             .evaluations = evaluations,
                             .evaluations_max = o.evaluations_max,
-                            .difference = BATTEN_DIFFERENCE * frame.cell};
-  st = make_surface(&sampler, &frame, seed_count, seeds, &o, &surface, &found);
+                            .difference = BATTEN_DIFFERENCE * frame.cell,
+                            .exponent = unit_exponent(frame.cell)};
+  st = make_in_unit(&sampler, &frame, seed_count, seeds, &o, &surface, &found);
   batten_free(ctx, searched);
   found.evaluations = sampler.evaluations;
   if (st >= 0) {

@@ -3,10 +3,26 @@
 
 #include "base/checked.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
 enum { DIFFERENCE_CHUNK = 4096 }; /* points whose neighbours are held at a time: 0.6 MB */
+
+/* The field at the points, in its own unit. */
+static batten_status ask(const batten_sampler *s, size_t count, const double *points, double *values,
+                         double *gradients) {
+  const batten_field *f = s->field;
+  if (s->exponent == 0) return f->evaluate(f->user, s->ctx, count, points, values, gradients, NULL);
+  const size_t n = f->dimension;
+  double *own = batten_alloc_array(s->ctx, count, n * sizeof *own);
+  if (!own) return BATTEN_E_NOMEM;
+  for (size_t i = 0; i < count * n; i++) own[i] = ldexp(points[i], s->exponent);
+  batten_status st = f->evaluate(f->user, s->ctx, count, own, values, gradients, NULL);
+  for (size_t i = 0; gradients && st >= 0 && i < count * n; i++) gradients[i] = ldexp(gradients[i], s->exponent);
+  batten_free(s->ctx, own);
+  return st;
+}
 
 static batten_status evaluate(batten_sampler *s, size_t count, const double *points, double *values,
                               double *gradients) {
@@ -16,13 +32,14 @@ static batten_status evaluate(batten_sampler *s, size_t count, const double *poi
     return batten_fail(s->ctx, BATTEN_E_TOO_LARGE,
                        "opt.evaluations_max: %zu; %zu evaluations done, %zu more asked for; raise it or opt.cell",
                        s->evaluations_max, s->evaluations, count);
-  batten_status st = s->field->evaluate(s->field->user, s->ctx, count, points, values, gradients, NULL);
+  batten_status st = ask(s, count, points, values, gradients);
   if (st < 0) return st;
   s->evaluations += count;
   size_t bad = batten_first_nonfinite(count, values);
   if (bad == count) return BATTEN_OK;
   char place[128];
-  const double *p = points + n * bad;
+  double p[3] = {0, 0, 0};
+  for (unsigned k = 0; k < n; k++) p[k] = ldexp(points[n * bad + k], s->exponent);
   if (n == 2)
     snprintf(place, sizeof place, "(%.17g, %.17g)", p[0], p[1]);
   else

@@ -10,6 +10,7 @@ typedef struct batten_sampler {
   const batten_field *field;
   size_t evaluations, evaluations_max; /* 0 = no limit */
   double difference;                   /* half the step of central differences, for fields without gradients */
+  int exponent;                        /* points here times 2^exponent are the field's; gradients to match */
 } batten_sampler;
 
 /* values [count] at points [count][n]. Fails: what the field fails with, INVALID (a value is not finite, names the
