@@ -55,7 +55,7 @@ static void report_reduction(const solid_work *w, cli_report *r) {
   const bool used = w->request->fit.reduce > 0;
   cli_report_number(r, "reduce", used ? w->request->fit.reduce : NAN);
   cli_report_number(r, "distance_certified", used ? i->error_certified : NAN);
-  cli_report_number(r, "distance_rms", used ? i->error_rms : NAN);
+  cli_report_number(r, "distance_certified_rms", used ? i->error_rms : NAN);
   cli_report_number(r, "reduce_ratio", used ? i->ratio_max : NAN);
   if (used) {
     cli_report_count(r, "points_certified", i->certified_points);
@@ -100,7 +100,7 @@ static void report_fit(const solid_work *w, cli_report *r) {
   report_iteration(w, r);
   cli_report_number(r, "residual_max", i->residual_max);
   cli_report_number(r, "distance_max", i->distance_max);
-  cli_report_number(r, "noise_reached", i->distance_rms);
+  cli_report_number(r, "distance_rms", i->distance_rms);
   cli_report_count(r, "residual_points", i->residual_points);
   cli_report_number(r, "rcond", iterative ? NAN : s->rcond);
   cli_report_number(r, "loo_rms", i->spline.loo_rms);

@@ -155,22 +155,32 @@ static size_t keep_surface_points(unsigned n, size_t count, const double *f, con
   for (size_t i = 0; i < count; i++) largest = fmax(largest, fmax(fabs(f[i]), fabs(u[i])));
   /* 1e-6: far above the residual of a fit, far below a pair's distance */
   for (size_t i = 0; i < count; i++) kept += fabs(f[i]) <= 1e-6 * largest;
-  if (kept < count / 4) return count; /* a third are on the surface when every point has a pair */
+  if (kept == 0 || kept < count / 4) return count; /* a third are on the surface when every point has a pair */
   kept = 0;
   for (size_t i = 0; i < count; i++)
     if (fabs(f[i]) <= 1e-6 * largest) memmove(points + kept++ * n, points + i * n, n * sizeof *points);
   return kept;
 }
 
-/* The points of a solid of which only the centres are known. */
+/* The points of a solid of which only the centres are known. Fast sums of the default 1e-7 tell f = 0 to 1e-6 as
+ * well; where they do not come so near, the sums are direct, however many. */
 static batten_status guess_points(batten_context *ctx, batten_solid *s) {
-  double *f = batten_alloc_array(ctx, s->count, sizeof *f), *u = batten_alloc_array(ctx, s->count, sizeof *u);
-  batten_status st = f && u ? BATTEN_OK : BATTEN_E_NOMEM;
-  if (st >= 0) st = batten_solid_evaluate(ctx, s, s->count, s->points, f, NULL, NULL);
-  if (st >= 0) st = batten_spline_evaluate(ctx, s->spline, s->count, s->points, u, NULL, NULL);
-  if (st >= 0) s->count = keep_surface_points(s->n, s->count, f, u, s->points);
+  const size_t count = s->count;
+  const bool few = batten_solid_points_to_sum(s, count) == count;
+  batten_solid_evaluator *e = NULL;
+  double *f = batten_alloc_array(ctx, count, 2 * sizeof *f), *u = f ? f + count : NULL;
+  if (!f) return BATTEN_E_NOMEM;
+  batten_status st = batten_solid_evaluator_new(ctx, s, few ? BATTEN_EVALUATE_DIRECT : BATTEN_EVALUATE_AUTO, 0, &e);
+  if (st == BATTEN_W_ACCURACY) {
+    batten_solid_evaluator_free(e);
+    st = batten_solid_evaluator_new(ctx, s, BATTEN_EVALUATE_DIRECT, 0, &e);
+  }
+  if (st >= 0) st = batten_carrier_evaluate(ctx, s->carrier, count, s->points, u, NULL, NULL);
+  if (st >= 0) st = batten_solid_evaluator_evaluate(ctx, e, count, s->points, f, NULL);
+  for (size_t i = 0; st >= 0 && i < count; i++) u[i] -= s->sign * f[i]; /* f = sign (f_c - U) */
+  batten_solid_evaluator_free(e);
+  if (st >= 0) s->count = keep_surface_points(s->n, count, f, u, s->points);
   batten_free(ctx, f);
-  batten_free(ctx, u);
   return st;
 }
 
@@ -226,22 +236,30 @@ batten_status batten_solid_create(batten_context *ctx, batten_spline *spline, ba
 
 enum { NEWTON_STEPS = 20 };
 
-/* Moves points onto f = 0 by Newton steps along the gradient, none longer than step_max. */
-static batten_status pull_to_surface(batten_context *ctx, const batten_solid *s, double step_max, double *points) {
+/* Moves the points of s onto f = 0 by Newton steps along the gradient, none longer than step_max; ends when no point
+ * moves any more, to rounding. */
+static batten_status pull_to_surface(batten_context *ctx, batten_solid *s, double step_max) {
   unsigned n = s->n;
+  double *points = s->points, longest = INFINITY;
+  batten_solid_evaluator *e = NULL;
   double *f = batten_alloc_array(ctx, s->count, sizeof *f), *df = batten_alloc_array(ctx, s->count, n * sizeof *df);
   batten_status st = f && df ? BATTEN_OK : BATTEN_E_NOMEM;
-  for (unsigned round = 0; st >= 0 && round < NEWTON_STEPS; round++) {
-    st = batten_solid_evaluate(ctx, s, s->count, points, f, df, NULL);
+  if (st >= 0) st = batten_solid_evaluator_new(ctx, s, BATTEN_EVALUATE_AUTO, 0, &e);
+  st = batten_expect(ctx, st, BATTEN_W_ACCURACY); /* they are seeds: as near as the sums get */
+  for (unsigned round = 0; st >= 0 && round < NEWTON_STEPS && longest > 1e-12 * step_max; round++) {
+    st = batten_solid_evaluator_evaluate(ctx, e, s->count, points, f, df);
+    longest = 0;
     for (size_t i = 0; st >= 0 && i < s->count; i++) {
       double square = 0;
       for (unsigned k = 0; k < n; k++) square += df[i * n + k] * df[i * n + k];
       double length = sqrt(square), step = fabs(f[i]) / length;
       if (!(step > 0) || !isfinite(step)) continue; /* there already, or no way known */
+      longest = fmax(longest, step);
       double scale = fmin(1, step_max / step) * f[i] / square;
       for (unsigned k = 0; k < n; k++) points[i * n + k] -= scale * df[i * n + k];
     }
   }
+  batten_solid_evaluator_free(e);
   batten_free(ctx, f);
   batten_free(ctx, df);
   return st;
@@ -277,7 +295,7 @@ batten_status batten_solid_with_carrier(batten_context *ctx, const batten_solid 
   double diagonal = 0;
   for (unsigned k = 0; k < s->n; k++) diagonal += (s->upper[k] - s->lower[k]) * (s->upper[k] - s->lower[k]);
   /* A tenth of the diagonal: a step that stays on its side of the solid. */
-  st = pull_to_surface(ctx, s, 0.1 * sqrt(diagonal), s->points);
+  st = pull_to_surface(ctx, s, 0.1 * sqrt(diagonal));
   if (st < 0) {
     batten_solid_free(s);
     return st;

@@ -408,7 +408,7 @@ static batten_status cure(fit_state *f) {
 
 size_t batten_solid_points_to_sum(const batten_solid *s, size_t count) {
   enum { TERMS = 1000000000, LEAST = 1000 };
-  const size_t most = TERMS / batten_solid_term_count(s);
+  const size_t terms = batten_solid_term_count(s), most = TERMS / (terms ? terms : 1);
   if (count <= most || count <= LEAST) return count;
   return most > LEAST ? most : LEAST;
 }
@@ -427,9 +427,10 @@ static batten_status measure_residual(fit_state *f) {
   for (size_t i = 0; st >= 0 && i < count; i++) {
     double square = 0;
     for (size_t k = 0; k < n; k++) square += gradients[i * n + k] * gradients[i * n + k];
-    f->info.residual_max = fmax(f->info.residual_max, fabs(values[i]) / f->best.value_range);
-    if (values[i] != 0) f->info.distance_max = fmax(f->info.distance_max, fabs(values[i]) / sqrt(square));
-    if (values[i] != 0) f->info.distance_rms += values[i] * values[i] / square / (double)count;
+    const double miss = fabs(values[i]), cut = batten_solid_cut_distance(miss, sqrt(square), f->info.noise);
+    f->info.residual_max = fmax(f->info.residual_max, miss / f->best.value_range);
+    if (miss != 0) f->info.distance_max = fmax(f->info.distance_max, miss / sqrt(square));
+    f->info.distance_rms += cut * cut / (double)count;
   }
   f->info.distance_rms = sqrt(f->info.distance_rms);
   f->info.residual_points = count;

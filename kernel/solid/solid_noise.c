@@ -2,10 +2,10 @@
  *
  *   estimate  At some thousand points a quadric over the local plane is fitted to the nearest neighbours by least
  *             squares; the root mean square of what it leaves, over k + 1 - 6 degrees of freedom, is the noise there.
- * Its median over the places passes over edges and strays. A plane would take curvature for noise. choice discrepancy
- * principle [Morozov 1966]: the smoothing rho at which the root mean square distance |f| / |grad f| of the points
- * from the surface is the noise, by the secant method on log rho against the log of that distance, which grows with
- * rho throughout.
+ *             Its median over the places passes over edges and strays. A plane would take curvature for noise.
+ *   choice    Discrepancy principle [Morozov 1966]: the smoothing rho at which the root mean square distance
+ *             |f| / |grad f| of the points from the surface is the noise, by the secant method on log rho against the
+ *             log of that distance, which grows with rho throughout.
  *
  * How rho depends on the number of points N, with the noise s the same: the spline minimises
  * energy + sum (f(x_i) - v_i)^2 / rho, the sum grows with N, so the same spline for other N has rho = N c. At the
@@ -124,6 +124,11 @@ batten_status batten_solid_estimate_noise(batten_context *ctx, const surface_dat
 /* Beyond so many times the noise a point is a stray and counts as if it were there; so do vanishing gradients. */
 static const double CUT = 5;
 
+double batten_solid_cut_distance(double f, double slope, double noise) {
+  const double most = CUT * noise;
+  return noise > 0 && f > most * slope ? most : f > 0 ? f / slope : 0;
+}
+
 batten_status batten_solid_rms_distance(batten_context *ctx, const batten_solid *s, size_t of, const double *points,
                                         double noise, double *rms) {
   /* Many are evenly drawn: direct sums at all would take time in proportion to their square. */
@@ -135,8 +140,7 @@ batten_status batten_solid_rms_distance(batten_context *ctx, const batten_solid 
   batten_status st = batten_solid_evaluate(ctx, s, count, at, values, values + count, NULL);
   for (size_t i = 0; st >= 0 && i < count; i++) {
     const double *g = values + count + i * n;
-    double f = fabs(values[i]), slope = sqrt(dot(n, g, g)), most = CUT * noise;
-    double distance = noise > 0 && f > most * slope ? most : f > 0 ? f / slope : 0;
+    const double distance = batten_solid_cut_distance(fabs(values[i]), sqrt(dot(n, g, g)), noise);
     sum += distance * distance;
   }
   *rms = sqrt(sum / (double)count);

@@ -9,8 +9,10 @@
 /* Standard deviation of the points' distance from the surface, 0 where quadrics fit them. */
 batten_status batten_solid_estimate_noise(batten_context *ctx, const surface_data *d, double *noise);
 
-/* Root mean square of |f| / |grad f| at the points, or at evenly drawn ones of many, each cut at 5 noise (noise 0: not
- * cut). */
+/* f / slope, cut at 5 noise (noise 0: not cut); f >= 0. */
+double batten_solid_cut_distance(double f, double slope, double noise);
+
+/* Root mean square of |f| / |grad f| at the points, or at evenly drawn ones of many, each cut as above. */
 batten_status batten_solid_rms_distance(batten_context *ctx, const batten_solid *s, size_t count,
                                         const double *points, double noise, double *rms);
 

@@ -185,6 +185,8 @@ run 0 "" solid s.csv --report u.json --quiet --reduce 0.05 --save few-centres.js
 holds u.json reduce 'x == 0.05'
 holds u.json distance_certified 'x > 0 && x <= 0.05'
 holds u.json reduce_ratio 'x <= 1'
+holds u.json distance_certified_rms "x > 0 && x < $(figure u.json distance_certified)"
+holds u.json distance_rms "abs(x / $(figure u.json distance_certified_rms) - 1) < 1e-6"
 holds u.json points_certified "x == $(figure u.json points_used)"
 holds u.json centers "x < 0.7 * $(figure u.json points_used)"
 run 2 "--reduce" solid s.csv --reduce -1
@@ -194,7 +196,7 @@ run 0 "" solid noisy.xyz --report u.json --quiet --noise auto --cell 0.1
 holds u.json noise 'x > 0.017 && x < 0.023'
 run 0 "" solid noisy.xyz --report u.json --quiet --noise 0.015 --cell 0.1
 holds u.json noise 'x == 0.015'
-holds u.json noise_reached 'x > 0.0142 && x < 0.0158'
+holds u.json distance_rms 'x > 0.0142 && x < 0.0158'
 holds u.json smoothing 'x > 0'
 run 2 "--noise" solid s.csv --noise -1
 run 0 "" solid s.csv --orientation estimate --reduce 0.05 --cell 0.4

@@ -8,7 +8,7 @@
 #include "solid/solid_inner.h"
 #include "tap.h"
 
-enum { MAX = 15000, PROBES = 1500 };
+enum { MAX = 4000, PROBES = 1500 };
 
 static double points[3 * MAX], normals[3 * MAX];
 
@@ -151,7 +151,7 @@ static void test_accuracy(batten_context *ctx, const recipe *r, batten_solid *s,
   T_CHECK(i.method == BATTEN_EVALUATE_FAST && i.places > 200 && i.terms >= r->count,
           "%s, %g: %zu terms, sums of %.1g are off by %.1g at %zu places", r->what, accuracy, i.terms,
           i.sums_accuracy, i.error, i.places);
-  T_RATIO(i.error, accuracy / 3, "what is told is a third of what was asked for at most");
+  T_RATIO(i.error, accuracy / 6, "what is told is a sixth of what was asked for at most");
   T_RATIO(distance_to_direct(ctx, s, e, &far, &turn, &differ), accuracy, "at 1000 other places beside the surface");
   T_RATIO(far, 4 * accuracy, "at 500 places in the grown box, where f is large");
   /* A kernel's sums lose digits in each derivative; a gradient that is off by 1e-2 still leads to the surface. */
@@ -173,20 +173,22 @@ static void test_recipe(batten_context *ctx, const recipe *r, double accuracy, d
 /* ---- the same bits ---- */
 
 static void test_threads(void) {
-  const recipe r = {"moon", 3, 2, 3500, moon, NULL, BATTEN_ORIENT_DATA_AUTO};
+  const recipe r = {"torus, gradients", 3, 3, 3500, torus, NULL, BATTEN_ORIENT_DATA_GRADIENTS};
+  const unsigned threads[2] = {1, 5};
   static double x[3 * PROBES], f[2][PROBES], g[2][3 * PROBES];
   for (int t = 0; t < 2; t++) {
-    batten_context *ctx = t_context(NULL, NULL, t ? 4 : 1);
+    batten_context *ctx = t_context(NULL, NULL, threads[t]);
     batten_solid *s = make(ctx, &r);
     batten_solid_evaluator *e = NULL;
     choose_probes(s, x);
-    T_OK(batten_solid_evaluator_new(ctx, s, BATTEN_EVALUATE_FAST, 1e-6, &e), ctx);
+    T_OK(batten_solid_evaluator_new(ctx, s, BATTEN_EVALUATE_FAST, 1e-5, &e), ctx);
     T_OK(batten_solid_evaluator_evaluate(ctx, e, PROBES, x, f[t], g[t]), ctx);
     batten_solid_evaluator_free(e);
     batten_solid_free(s);
     batten_context_free(ctx);
+    T_CHECK(!memcmp(f[0], f[t], sizeof f[0]) && !memcmp(g[0], g[t], sizeof g[0]), "the same bits on %u threads",
+            threads[t]);
   }
-  T_CHECK(!memcmp(f[0], f[1], sizeof f[0]) && !memcmp(g[0], g[1], sizeof g[0]), "the same bits on 1 and 4 threads");
 }
 
 /* ---- other kinds ---- */
@@ -241,12 +243,8 @@ static batten_mesh *surface_of(batten_context *ctx, const batten_solid *s, batte
 }
 
 /* Vertices settle to 1e-6 of the box by f of fast sums: f of direct ones agrees to that and what the sums are off. */
-static void test_surface(batten_context *ctx) {
-  const recipe r = {"torus", 3, 2, 3500, torus, NULL, BATTEN_ORIENT_DATA_AUTO};
-  batten_solid *s = make(ctx, &r);
-  batten_solid_evaluator *e = NULL;
+static void expect_same_surface(batten_context *ctx, const batten_solid *s, batten_solid_evaluator *e) {
   batten_mesh_measures direct, fast, found;
-  T_OK(batten_solid_evaluator_new(ctx, s, BATTEN_EVALUATE_FAST, 0, &e), ctx);
   batten_field field = batten_solid_evaluator_field(e);
   T_CHECK(field.dimension == 3 && field.order == 1 && field.bounds, "a field of order 1 with bounds");
   batten_mesh_free(surface_of(ctx, s, batten_solid_field(s), false, &direct));
@@ -266,19 +264,21 @@ static void test_surface(batten_context *ctx) {
   free(f);
   free(df);
   batten_mesh_free(mesh);
-  batten_solid_evaluator_free(e);
-  batten_solid_free(s);
 }
 
 /* ---- the sign check ---- */
 
-static batten_sign_check check(batten_context *ctx, const surface_data *d, batten_solid *s, batten_evaluation how,
-                               double accuracy) {
-  batten_solid_evaluator *e = NULL;
+static batten_sign_check check(batten_context *ctx, const surface_data *d, batten_solid *s,
+                               batten_solid_evaluator *e) {
   batten_sign_check c = {0};
-  batten_status st = batten_solid_evaluator_new(ctx, s, how, accuracy, &e);
-  T_CHECK(st == BATTEN_OK || st == BATTEN_W_ACCURACY, "%s", batten_status_name(st));
   T_OK(batten_solid_check_sign(ctx, d, 16, 0, s, e, &c), ctx);
+  return c;
+}
+
+static batten_sign_check check_directly(batten_context *ctx, const surface_data *d, batten_solid *s) {
+  batten_solid_evaluator *e = NULL;
+  T_OK(batten_solid_evaluator_new(ctx, s, BATTEN_EVALUATE_DIRECT, 0, &e), ctx);
+  batten_sign_check c = check(ctx, d, s, e);
   batten_solid_evaluator_free(e);
   return c;
 }
@@ -292,55 +292,205 @@ static void expect_same_check(const char *what, batten_sign_check a, batten_sign
           a.phantom_cells, b.phantom_cells);
 }
 
-/* 15,000 points are fitted by iteration; what fast sums say of the fit is what direct ones say. */
-static void test_large_fit(batten_context *ctx) {
-  enum { COUNT = 15000 };
+/* What fast sums say of a fit by iteration is what direct ones say: its check, and its surface. */
+static void test_iterative_fit(batten_context *ctx) {
+  enum { COUNT = 4000 };
+  batten_solid_evaluator *e = NULL;
   batten_solid_options o = batten_solid_options_default();
   batten_solid_info info;
   batten_solid *s = NULL;
   surface_data d = {0};
-  moon(COUNT);
+  torus(COUNT);
   o.evaluation = BATTEN_EVALUATE_FAST;
+  o.spline.saddle.method = BATTEN_SADDLE_ITERATIVE;
+  o.check_cells = 16;
   T_OK(batten_solid_fit(ctx, 3, COUNT, points, &o, &s, &info), ctx);
   if (!s) return;
   T_CHECK(info.evaluation.method == BATTEN_EVALUATE_FAST && info.evaluation.evaluations > 4 * COUNT,
           "%d points: the check evaluated f at %zu by fast sums", (int)COUNT, info.evaluation.evaluations);
-  T_RATIO(info.evaluation.error, 1e-7, "off by");
+  T_RATIO(info.evaluation.error, 1e-5, "off by");
   T_CHECK(info.residual_points == COUNT && info.sign == BATTEN_SIGN_CLEAN,
           "all points are looked at directly; clean");
   T_OK(batten_surface_data_make(ctx, 3, COUNT, points, &o, &d), ctx);
-  expect_same_check("direct and fast", check(ctx, &d, s, BATTEN_EVALUATE_DIRECT, 0),
-                    check(ctx, &d, s, BATTEN_EVALUATE_FAST, 1e-7));
+  T_OK(batten_solid_evaluator_new(ctx, s, BATTEN_EVALUATE_FAST, 0, &e), ctx);
+  expect_same_check("direct and fast", check_directly(ctx, &d, s), check(ctx, &d, s, e));
+  expect_same_surface(ctx, s, e);
+  batten_solid_evaluator_free(e);
   batten_surface_data_free(ctx, &d);
   batten_solid_free(s);
 }
 
-/* Clusters of 8 points within 1e-7: probes 1e-8 beside them are beyond what sums of 1e-5 can tell from the points,
- * which are summed again directly. Without that all of the clusters would be called weak. */
-static void test_clusters(batten_context *ctx) {
-  enum { PLACES = 3000, CLUSTERS = 60, EACH = 8, COUNT = PLACES + CLUSTERS * (EACH - 1) };
-  batten_solid_options o = batten_solid_options_default();
-  batten_solid *s = NULL;
-  surface_data d = {0};
-  uint64_t seed = 8;
-  scene_sphere_points(3, PLACES, points);
-  for (size_t i = 0; i < COUNT - PLACES; i++) {
-    double *x = points + 3 * (PLACES + i), r;
-    for (size_t k = 0; k < 3; k++) x[k] = points[3 * (i / (EACH - 1)) + k] + 1e-7 * (t_uniform(&seed) - 0.5);
-    r = length(3, x);
-    for (size_t k = 0; k < 3; k++) x[k] /= r;
+/* f = y and a sum of small terms at random centres about the box [-1, 1]^2, which needs no fit. */
+static batten_solid *make_plain(batten_context *ctx, unsigned m, size_t count, size_t point_count, const double *on) {
+  const double lower[2] = {-1, -1}, upper[2] = {1, 1}, polynomial[6] = {0, 0, -1};
+  double *x = malloc(2 * count * sizeof *x), *w = malloc(count * sizeof *w);
+  uint64_t seed = 11;
+  for (size_t i = 0; i < count; i++) {
+    w[i] = 20 * (t_uniform(&seed) - 0.5) / (double)count;
+    for (size_t k = 0; k < 2; k++) x[2 * i + k] = 2 * t_uniform(&seed) - 1;
   }
-  o.orientation = BATTEN_ORIENT_NEVER;
-  batten_status st = batten_solid_fit(ctx, 3, COUNT, points, &o, &s, NULL);
-  T_CHECK(st >= 0, "clusters: %s", batten_status_name(st));
-  T_OK(batten_surface_data_make(ctx, 3, COUNT, points, &o, &d), ctx);
-  batten_sign_check direct = check(ctx, &d, s, BATTEN_EVALUATE_DIRECT, 0),
-                    fast = check(ctx, &d, s, BATTEN_EVALUATE_FAST, 1e-5);
-  T_CHECK(fast.weak_gradients <= direct.weak_gradients + CLUSTERS,
-          "weak gradients beside clusters: %zu by direct sums, %zu by coarse ones", direct.weak_gradients,
-          fast.weak_gradients);
+  batten_spline_parts parts = {.struct_size = sizeof parts,
+                               .n = 2,
+                               .m = m,
+                               .count = count,
+                               .centers = x,
+                               .coefficients = w,
+                               .polynomial_count = m == 2 ? 3 : 6,
+                               .polynomial = polynomial,
+                               .scale = 1};
+  batten_spline *spline = NULL;
+  batten_carrier *none = NULL;
+  batten_solid *s = NULL;
+  T_OK(batten_spline_create(ctx, &parts, &spline), ctx);
+  T_OK(batten_carrier_none(ctx, 2, &none), ctx);
+  T_OK(batten_solid_create(ctx, spline, none, 1, lower, upper, point_count, on, &s), ctx);
+  batten_carrier_free(none);
+  batten_spline_free(spline);
+  free(x);
+  free(w);
+  return s;
+}
+
+/* AUTO takes fast sums from 12,000 terms on, from 30,000 with r^4 ln r. */
+static void test_auto(batten_context *ctx) {
+  const struct {
+    unsigned m;
+    size_t count;
+    batten_evaluation method;
+  } cases[4] = {{2, 11999, BATTEN_EVALUATE_DIRECT},
+                {2, 12000, BATTEN_EVALUATE_FAST},
+                {3, 29999, BATTEN_EVALUATE_DIRECT},
+                {3, 30000, BATTEN_EVALUATE_FAST}};
+  const double on[4] = {0.5, 0, -0.5, 0};
+  for (int i = 0; i < 4; i++) {
+    batten_solid *s = make_plain(ctx, cases[i].m, cases[i].count, 2, on);
+    batten_solid_evaluator *e = NULL;
+    T_OK(batten_solid_evaluator_new(ctx, s, BATTEN_EVALUATE_AUTO, 1e-3, &e), ctx);
+    T_CHECK(batten_solid_evaluator_get_info(e).method == cases[i].method, "m = %u, %zu terms: %s", cases[i].m,
+            cases[i].count, cases[i].method == BATTEN_EVALUATE_FAST ? "fast" : "direct");
+    batten_solid_evaluator_free(e);
+    batten_solid_free(s);
+  }
+}
+
+enum { CLUSTERS = 60, EACH = 4, CLUSTERED = CLUSTERS * EACH };
+
+/* How many of the points do not see f of e rise along y, a tenth of their spacing before and behind. */
+static size_t count_lost(batten_context *ctx, batten_solid_evaluator *e, const surface_data *d) {
+  double x[6 * CLUSTERED], f[3 * CLUSTERED];
+  size_t lost = 0;
+  for (size_t i = 0; i < d->count; i++)
+    for (int side = -1; side <= 1; side++) {
+      x[6 * i + 2 * (size_t)(side + 1)] = d->points[2 * i];
+      x[6 * i + 2 * (size_t)(side + 1) + 1] = d->points[2 * i + 1] + 0.1 * side * d->spacing[i];
+    }
+  T_OK(batten_solid_evaluator_evaluate(ctx, e, 3 * d->count, x, f, NULL), ctx);
+  for (size_t i = 0; i < d->count; i++) {
+    const double *v = f + 3 * i;
+    lost += !((v[0] < v[1] && v[1] < v[2]) || (v[0] > v[1] && v[1] > v[2]));
+  }
+  return lost;
+}
+
+/* Clusters of 4 points within 1e-9 on y = 0, where cells of the sums meet: f by sums steps there by what these are
+ * off, which is more than it rises between probes 1e-11 apart. Points that seem weak for that are summed again. */
+static void test_clusters(batten_context *ctx) {
+  batten_solid_options o = batten_solid_options_default();
+  batten_solid_evaluator *e = NULL;
+  surface_data d = {0};
+  for (size_t i = 0; i < CLUSTERED; i++) {
+    const size_t cluster = i / EACH;
+    points[2 * i] = -0.9 + 0.03 * (double)cluster + 1e-10 * (double)(i % EACH);
+    points[2 * i + 1] = 0;
+  }
+  batten_solid *s = make_plain(ctx, 2, 4000, CLUSTERED, points);
+  T_OK(batten_surface_data_make(ctx, 2, CLUSTERED, points, &o, &d), ctx);
+  T_OK(batten_solid_evaluator_new(ctx, s, BATTEN_EVALUATE_FAST, 1e-5, &e), ctx);
+  const size_t lost = count_lost(ctx, e, &d);
+  T_CHECK(lost > CLUSTERED / 10, "of %d points in clusters %zu seem weak by sums alone", (int)CLUSTERED, lost);
+  batten_sign_check direct = check_directly(ctx, &d, s), fast = check(ctx, &d, s, e);
+  batten_solid_evaluator_free(e);
+  T_CHECK(direct.weak_gradients == 0 && fast.weak_gradients == 0, "summed again none is: %zu, directly %zu",
+          fast.weak_gradients, direct.weak_gradients);
   batten_surface_data_free(ctx, &d);
   batten_solid_free(s);
+}
+
+/* ---- solids made of large ones ---- */
+
+/* 12,000 centres: points are moved to the surface under another carrier by fast sums, and direct ones find them
+ * there. Of 40,000 centres f vanishes at those on y = 0. */
+static void test_made(batten_context *ctx) {
+  enum { POINTS = 200, CENTERS = 40000, ON = CENTERS / 4 + 100 };
+  const double lower[2] = {-1, -1}, upper[2] = {1, 1}, polynomial[3] = {0, 0, -1};
+  static double on[2 * POINTS], f[POINTS], df[2 * POINTS], x[2 * CENTERS], w[CENTERS];
+  batten_carrier *plane = NULL, *none = NULL;
+  batten_spline *spline = NULL;
+  batten_solid *moved = NULL, *guessed = NULL;
+  batten_solid_evaluator *e = NULL;
+  double worst = 0;
+  size_t count;
+  uint64_t seed = 13;
+  for (size_t i = 0; i < POINTS; i++) on[2 * i] = -1 + 2.0 * (double)i / POINTS;
+  batten_solid *s = make_plain(ctx, 2, 12000, POINTS, on);
+  T_OK(batten_carrier_half_space(ctx, 2, (double[]){0, 0.3}, (double[]){0.1, -1}, &plane), ctx);
+  T_OK(batten_solid_with_carrier(ctx, s, plane, &moved), ctx);
+  T_OK(batten_solid_evaluate(ctx, moved, POINTS, batten_solid_points(moved, &count), f, df, NULL), ctx);
+  for (size_t i = 0; i < POINTS; i++) worst = fmax(worst, fabs(f[i]) / length(2, df + 2 * i));
+  T_CHECK(count == POINTS && worst > 1e-14, "%zu points, by other sums", count);
+  T_RATIO(worst, 1e-7 * 2 * sqrt(2), "are moved to the surface");
+  T_OK(batten_solid_evaluator_new(ctx, moved, BATTEN_EVALUATE_AUTO, 1e-5, &e), ctx);
+  T_CHECK(batten_solid_evaluator_get_info(e).method == BATTEN_EVALUATE_FAST, "which has an evaluator too");
+  batten_solid_evaluator_free(e);
+  batten_solid_free(moved);
+  batten_solid_free(s);
+  batten_carrier_free(plane);
+
+  /* Weights that are odd in y leave f = 0 on y = 0. */
+  for (size_t i = 0; i < CENTERS; i++) {
+    const bool mirrored = i >= ON && (i - ON) % 2;
+    x[2 * i] = mirrored ? x[2 * i - 2] : 2 * t_uniform(&seed) - 1;
+    x[2 * i + 1] = i < ON ? 0 : mirrored ? -x[2 * i - 1] : 0.1 + 0.9 * t_uniform(&seed);
+    w[i] = i < ON ? 0 : mirrored ? -w[i - 1] : t_uniform(&seed) / CENTERS;
+  }
+  batten_spline_parts parts = {.struct_size = sizeof parts,
+                               .n = 2,
+                               .m = 2,
+                               .count = CENTERS,
+                               .centers = x,
+                               .coefficients = w,
+                               .polynomial_count = 3,
+                               .polynomial = polynomial,
+                               .scale = 1};
+  T_OK(batten_spline_create(ctx, &parts, &spline), ctx);
+  T_OK(batten_carrier_none(ctx, 2, &none), ctx);
+  T_OK(batten_solid_create(ctx, spline, none, 1, lower, upper, 0, NULL, &guessed), ctx);
+  const double *found = batten_solid_points(guessed, &count);
+  bool all_on = true;
+  for (size_t i = 0; i < count; i++) all_on = all_on && found[2 * i + 1] == 0;
+  T_CHECK(count == ON && all_on, "%zu of %d centres are on the surface", count, (int)CENTERS);
+  batten_solid_free(guessed);
+  batten_spline_free(spline);
+
+  /* No centres, and three of which none is on the surface: there is something to evaluate all the same. */
+  for (size_t few = 0; few <= 3; few += 3) {
+    double y[2] = {0.2, 0.3}, value = 0, again = 0;
+    parts.count = few;
+    parts.centers = x + 2 * (CENTERS - 4);
+    parts.coefficients = w + CENTERS - 4;
+    T_OK(batten_spline_create(ctx, &parts, &spline), ctx);
+    T_OK(batten_solid_create(ctx, spline, none, 1, lower, upper, 0, NULL, &guessed), ctx);
+    batten_solid_points(guessed, &count);
+    T_CHECK(count == few, "%zu centres", few);
+    T_OK(batten_solid_evaluator_new(ctx, guessed, BATTEN_EVALUATE_FAST, 1e-5, &e), ctx);
+    T_OK(batten_solid_evaluator_evaluate(ctx, e, 1, y, &value, NULL), ctx);
+    T_OK(batten_solid_evaluate(ctx, guessed, 1, y, &again, NULL, NULL), ctx);
+    T_RATIO(fabs(value - again), 1e-5, "%zu centres, fast sums asked for", few);
+    batten_solid_evaluator_free(e);
+    batten_solid_free(guessed);
+    batten_spline_free(spline);
+  }
+  batten_carrier_free(none);
 }
 
 /* ---- bad input, memory, cancelling ---- */
@@ -419,7 +569,7 @@ static void test_flat(batten_context *ctx) {
   batten_spline_free(spline);
 }
 
-enum { SMALL = 3200, MANY = 3000 };
+enum { SMALL = 3200, MANY = 600 };
 
 typedef struct life {
   batten_spline_parts parts;
@@ -436,7 +586,7 @@ static batten_status live(batten_context *ctx, void *arg) {
   batten_solid_evaluator *e = NULL;
   batten_status st = batten_spline_create(ctx, &l->parts, &spline);
   if (st >= 0) st = batten_carrier_ball(ctx, 2, center, 1, &ball);
-  if (st >= 0) st = batten_solid_create(ctx, spline, ball, 1, lower, upper, SMALL, l->parts.centers, &s);
+  if (st >= 0) st = batten_solid_create(ctx, spline, ball, 1, lower, upper, 8, l->parts.centers, &s);
   if (st >= 0) st = batten_solid_evaluator_new(ctx, s, BATTEN_EVALUATE_FAST, 1e-3, &e);
   if (st >= 0) st = batten_solid_evaluator_evaluate(ctx, e, MANY, l->x, l->f, NULL);
   batten_solid_evaluator_free(e);
@@ -472,21 +622,20 @@ int main(void) {
   batten_context *ctx = t_context(NULL, NULL, 2);
   const batten_orient_data none = BATTEN_ORIENT_DATA_AUTO, pairs = BATTEN_ORIENT_DATA_PAIRS,
                            gradients = BATTEN_ORIENT_DATA_GRADIENTS;
-  const recipe moon_r = {"moon, r", 3, 2, 3500, moon, NULL, none},
-               moon_pairs = {"moon, pairs, r", 3, 2, 1200, moon, scene_moon, pairs},
-               torus_cubic = {"torus, pairs, r^3", 3, 3, 1200, torus, scene_torus, pairs},
+  const recipe moon_pairs = {"moon, pairs, r", 3, 2, 1200, moon, scene_moon, pairs},
+               torus_cubic = {"torus, pairs, r^3", 3, 3, 1100, torus, scene_torus, pairs},
                torus_hermite = {"torus, gradients, r^3", 3, 3, 3500, torus, NULL, gradients},
-               plane = {"two contours, r^2 ln r", 2, 2, 3500, contours, NULL, none};
-  test_recipe(ctx, &moon_r, 1e-7, 1e-9);
-  test_recipe(ctx, &moon_pairs, 1e-7, 0);
-  test_recipe(ctx, &torus_cubic, 1e-5, 0);
+               plane = {"two contours, r^2 ln r", 2, 2, 3300, contours, NULL, none};
+  test_recipe(ctx, &moon_pairs, 1e-6, 0);
+  test_recipe(ctx, &torus_cubic, 1e-4, 0);
   test_recipe(ctx, &torus_hermite, 1e-5, 0);
   test_recipe(ctx, &plane, 1e-7, 1e-10);
   test_threads();
   test_kinds(ctx);
-  test_surface(ctx);
-  test_large_fit(ctx);
+  test_iterative_fit(ctx);
+  test_auto(ctx);
   test_clusters(ctx);
+  test_made(ctx);
   test_bad(ctx);
   test_flat(ctx);
   test_life();

@@ -134,6 +134,28 @@ static void test_pairs(batten_context *ctx) {
   free(points);
 }
 
+/* Above 50,000 points one in eight has its pair, a second one of eight that look two ways: on a ball, with its 64 far
+ * points, 1.25 N data; and so few pairs say inside and outside as well. The tolerance keeps it cheap. */
+static void test_many_pairs(batten_context *ctx) {
+  enum { COUNT = 50001 };
+  double *points = malloc(COUNT * 6 * sizeof *points), *normals = points + 3 * COUNT;
+  batten_solid_options o = batten_solid_options_default();
+  batten_solid_info info = {0};
+  scene_sphere_points(3, COUNT, points);
+  memcpy(normals, points, 3 * COUNT * sizeof *points);
+  o.normals = normals;
+  o.orientation = BATTEN_ORIENT_GIVEN;
+  o.check_cells = 8;
+  o.reduce = 0.02;
+  batten_solid *s = fit(ctx, COUNT, points, &o, BATTEN_OK, &info);
+  T_CHECK(info.orient_data == BATTEN_ORIENT_DATA_PAIRS && info.check_final.clean, "pairs, clean");
+  const double pairs = (double)info.reduced.points - COUNT;
+  T_CHECK(pairs > 0.24 * COUNT && pairs <= 0.25 * COUNT + 66, "%d points, %.0f off the surface", (int)COUNT, pairs);
+  T_RATIO(info.reduced.ratio_max, 1, "%zu centres keep to the tolerance", info.reduced.centers);
+  batten_solid_free(s);
+  free(points);
+}
+
 /* Too little to be met. */
 static void test_misses(batten_context *ctx) {
   enum { COUNT = 400 };
@@ -189,6 +211,7 @@ int main(void) {
   batten_context *ctx = t_context(NULL, NULL, 2);
   test_carrier(ctx);
   test_pairs(ctx);
+  test_many_pairs(ctx);
   test_misses(ctx);
   test_failures(ctx);
   T_CHECK(batten_bytes_in_use(ctx) == 0, "all memory is back");

@@ -65,8 +65,9 @@ typedef enum batten_evaluation {
   BATTEN_EVALUATE_AUTO = 0, /* FAST from 12,000 terms N + nM on, 30,000 with kernels beyond r and r^2 ln r;
                                DIRECT below */
   BATTEN_EVALUATE_DIRECT,   /* N terms for each place, to rounding: batten_solid_evaluate */
-  BATTEN_EVALUATE_FAST      /* by batten_spline_evaluator, as accurate as asked for. Stacks, trees and solids of one
-                               dimension have no such sums and are evaluated directly all the same */
+  BATTEN_EVALUATE_FAST      /* by batten_spline_evaluator, as accurate as asked for. Stacks, trees, solids of one
+                               dimension and splines without centres have no such sums and are evaluated directly all
+                               the same */
 } batten_evaluation;
 
 typedef struct batten_solid_options {
@@ -118,9 +119,10 @@ typedef struct batten_sign_check {
 typedef struct batten_solid_evaluator_info {
   batten_evaluation method; /* DIRECT or FAST; with DIRECT the next four are 0 */
   double error;          /* the largest |difference to direct f| / |grad f| at `places` over the diagonal of the box:
-                            how far the surface moves. Of millions of places the worst is up to three times that; in the box
-                            beside, where f is large, f is off by some times as much. A slope under 1 % of the median
-                            counts as 1 %, one off the surface as the median. */
+                            how far the surface moves. Elsewhere on the surface, where it is as steep, the worst is up
+                            to six times that, which accuracy allows for; in the box beside, where f is large, f is off by some
+                            times as much. A slope under 1 % of the median          counts as 1 %, one off the surface as the
+                            median. */
   double gradient_error; /* likewise of the gradients, |difference| / |grad f| */
   double sums_accuracy;  /* what the fast sums were asked for, see batten_spline_evaluator_new() */
   size_t places;         /* where f was summed directly too: up to 400 points of the surface, evenly drawn, and 112
@@ -142,7 +144,8 @@ typedef struct batten_solid_info {
   double residual_max;    /* max |f(x_i)| / (max - min of the interpolated values; where a carrier runs through all
                              points its own size in the box) */
   double distance_max;    /* max |f(x_i)| / |grad f(x_i)|, caller's unit */
-  double distance_rms;    /* root mean square of |f(x_i)| / |grad f(x_i)|, caller's unit */
+  double distance_rms;    /* root mean square of |f(x_i)| / |grad f(x_i)|, with noise each cut at 5 times it; caller's
+                             unit */
   double noise;           /* given or estimated, caller's unit; 0: none was asked for */
   double smoothing;       /* of the spline that is returned, as in batten_spline_options */
   size_t residual_points; /* at how many points these were looked for, by direct sums: all, or, where N times the
@@ -167,13 +170,16 @@ BATTEN_API batten_status batten_solid_fit(batten_context *ctx, unsigned n, size_
                                           batten_solid_info *info);
 
 /* The same spline under another carrier: the paper's deformation (figure 5). The points of the new solid are the old
- * ones moved to its surface by Newton's method, its box is theirs. */
+ * ones moved to its surface by Newton's method, its box is theirs. Takes up to 20 values and gradients at each, by a
+ * batten_solid_evaluator of AUTO: of large splines they are on the surface to 1e-7 of the box's diagonal. Fails:
+ * INVALID, NOMEM, CANCELLED. */
 BATTEN_API batten_status batten_solid_with_carrier(batten_context *ctx, const batten_solid *solid,
                                                    batten_carrier *carrier, batten_solid **out);
 
 /* From parts; sign is +1 or -1. spline and carrier are retained. lower/upper [n]: box of the data. points
  * [point_count][n]: on the surface, at least one, copied. NULL (point_count is not read): the centres at which f
- * vanishes to 1e-6; all centres when, after smoothing, under a quarter do. */
+ * vanishes to 1e-6; all centres when, after smoothing, under a quarter do. Where terms times centres are above 1e9,
+ * that is looked at with fast sums (BATTEN_EVALUATE_AUTO). Fails: INVALID, TOO_LARGE, NOMEM, CANCELLED. */
 BATTEN_API batten_status batten_solid_create(batten_context *ctx, batten_spline *spline, batten_carrier *carrier,
                                              int sign, const double *lower, const double *upper, size_t point_count,
                                              const double *points, batten_solid **out);
@@ -192,8 +198,9 @@ typedef struct batten_solid_evaluator batten_solid_evaluator;
 /* accuracy: how far the surface may move, over the diagonal of the solid's box, 1e-12 .. 1e-2; 0: 1e-7, a tenth of
  * what the polygoniser settles its vertices to. What the sums take for it is found by trial at some 500 places, which
  * are summed directly too: about a second, more for kernels beyond r and r^2 ln r. DIRECT evaluators take no time to
- * make and are exact. The solid is retained. Positive status: BATTEN_W_ACCURACY when the finest sums do not reach it;
- * the info says what they reach. Fails: INVALID, NOMEM, TOO_LARGE, CANCELLED. */
+ * make and are exact. The solid is retained. A carrier is evaluated as it is: one that is a solid of N' centres adds
+ * N' terms for each place. Positive status: BATTEN_W_ACCURACY when the finest sums do not reach it; the info says
+ * what they reach. Fails: INVALID, NOMEM, TOO_LARGE, CANCELLED. */
 BATTEN_API batten_status batten_solid_evaluator_new(batten_context *ctx, batten_solid *s, batten_evaluation how,
                                                     double accuracy, batten_solid_evaluator **out);
 /* points [count][n], finite; values [count], gradients [count][n], each may be NULL. ctx is the one that e was made
