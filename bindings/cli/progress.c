@@ -131,6 +131,11 @@ static void use_words(char *text, size_t size) {
       {"opt.evaluations_max", "evaluations"},
       {"opt.normals", "normals in the file"},
       {"opt.spline.smoothing", "--smoothing"},
+      {"opt.spline.saddle.accuracy", "--accuracy"},
+      {"opt.saddle.accuracy", "--accuracy"},
+      {"opt.saddle.method", "--method"},
+      {"opt.spline.m ", "--order "},
+      {"opt.spline.m:", "--order:"},
       {"opt.fit.", "opt."},
       {"see batten_loft_notes", "see remark in the report"},
       {"memory_limit", "--memory"},
@@ -151,7 +156,6 @@ static void use_words(char *text, size_t size) {
       {"opt.creases", "--crease-edges"},
       {"opt.line_vertices", "--lines"},
       {"opt.weld_radius", "--weld"},
-      {"noise: ", "--smooth: "},
       {"opt.parametrize.triangles", "triangles"},
       {"opt.parameters", "parameters"},
       {"opt.weights", "weights"},
@@ -168,6 +172,7 @@ static void use_words(char *text, size_t size) {
       {", or 0 for the most", ""},
       {", 0 = the most", ""},
   };
+  if (strncmp(text, "noise: ", 7) == 0) substitute(text, size, "noise: ", "--smooth: "); /* of a mesh; not --noise */
   for (size_t i = 0; i < sizeof words / sizeof *words; i++) substitute(text, size, words[i][0], words[i][1]);
   name_options(text);
 }

@@ -173,6 +173,9 @@ void solid_summary(const solid_work *w) {
   if (w->request->fit.reduce > 0)
     cli_line("centres", "%zu of %zu, the surface within %.3g of all points%s", i->reduced.centers, i->reduced.points,
              i->reduced.error_certified, i->reduced.certified_points == i->reduced.points ? "" : ", by fast sums");
+  if (i->noise > 0)
+    cli_line("noise", "%.3g, the points within %.3g of the surface (root mean square) by smoothing %.3g", i->noise,
+             i->distance_rms, i->smoothing);
   cli_line("sign", "%s%s%s", sign_name(i->sign), i->orientation == BATTEN_ORIENTATION_NONE ? "" : ", orientation ",
            i->orientation == BATTEN_ORIENTATION_NONE ? "" : orientation_name(i->orientation));
   if (w->body.evaluation.method == BATTEN_EVALUATE_FAST)

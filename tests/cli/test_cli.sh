@@ -186,7 +186,7 @@ holds u.json reduce 'x == 0.05'
 holds u.json distance_certified 'x > 0 && x <= 0.05'
 holds u.json reduce_ratio 'x <= 1'
 holds u.json distance_certified_rms "x > 0 && x < $(figure u.json distance_certified)"
-holds u.json distance_rms "abs(x / $(figure u.json distance_certified_rms) - 1) < 1e-6"
+holds u.json distance_rms "x > 0.999 * $(figure u.json distance_certified_rms) && x < 1.001 * $(figure u.json distance_certified_rms)"
 holds u.json points_certified "x == $(figure u.json points_used)"
 holds u.json centers "x < 0.7 * $(figure u.json points_used)"
 run 2 "--reduce" solid s.csv --reduce -1
@@ -194,11 +194,16 @@ awk 'BEGIN { srand(4); for (i = 0; i < 500; i++) { z = 1 - (2 * i + 1) / 500; r 
   n = -6; for (k = 0; k < 12; k++) n += rand(); s = 1 + 0.02 * n; print s * r * cos(a), s * r * sin(a), s * z } }' >noisy.xyz
 run 0 "" solid noisy.xyz --report u.json --quiet --noise auto --cell 0.1
 holds u.json noise 'x > 0.017 && x < 0.023'
-run 0 "" solid noisy.xyz --report u.json --quiet --noise 0.015 --cell 0.1
+run 0 "" solid noisy.xyz --report u.json --noise 0.015 --cell 0.1
 holds u.json noise 'x == 0.015'
 holds u.json distance_rms 'x > 0.0142 && x < 0.0158'
 holds u.json smoothing 'x > 0'
+grep -q '^noise .*0.015, ' out
+ok $? "and it says so: $(grep ^noise out)"
 run 2 "--noise" solid s.csv --noise -1
+run 1 "batten: --noise: 0.1 beside --smoothing" solid s.csv --noise 0.1 --smoothing 1
+run 1 "batten: --noise: 0.1 beside --reduce" solid s.csv --noise 0.1 --reduce 1
+run 1 "set --order to 2" solid s.csv --order 3 --carrier ball --orientation never
 run 0 "" solid s.csv --orientation estimate --reduce 0.05 --cell 0.4
 grep -q "^centres .* of all points$" out
 ok $? "pairs are summed directly too, and it says so: $(grep ^centres out)"
