@@ -4,7 +4,7 @@
  * the nearest points a poor choice, and each has its cure:
  *
  *   lines   neighbours of scan lines and contours lie along a line: half of them are kept, the others become the
- *           nearest ones that stand off that line
+ *           nearest ones that stand off that line, also where it bends (else the plane is that of the contour)
  *   noise   where the neighbourhood is not much thinner than wide, a wider one is taken when that makes it thinner in
  *           proportion: averaging over noise does, over a rim or a finger it does not. Points that lie in two sheets
  *           (excess of a two-point distribution) are the walls of something thin, no noise.
@@ -21,6 +21,8 @@
 enum { CHUNK = 256, SLICE = 32 * CHUNK, WIDE = 64, WIDEST = 160 };
 /* Neighbours that spread over less than this part of their length lie on a scan line or contour: no plane. */
 static const double THREAD = 0.3;
+/* Points of a line follow each other by so many times the distance to the second nearest at most. */
+static const double STEP = 1.7;
 /* Thickness over width up to which a plane is taken as it is: 10 neighbours then give its direction to 7 degrees. */
 static const double THICK = 0.4;
 /* By which a wider neighbourhood must be thinner in proportion: noise gives 0.65 and 0.61 from step to step. */
@@ -85,18 +87,43 @@ static bool in_two_sheets(const batten_orient_graph *g, const plane *p, size_t k
   return fourth < TWO_SHEETS * second * second;
 }
 
-/* Keeps the nearer half of the neighbours; the others become the nearest ones that stand off the line along axis. */
+/* Which of the `found` points near i, nearest first, hang on it by steps of at most `step`: those of its own line,
+ * where points stand evenly on it. */
+static void follow_line(const batten_orient_graph *g, size_t i, size_t found, const size_t *index, double step,
+                        bool *on_line) {
+  const double *x = g->points;
+  size_t reached[WIDE + 1] = {i}, count = 1;
+  for (size_t q = 0; q < found; q++) on_line[q] = false;
+  for (size_t r = 0; r < count; r++)
+    for (size_t q = 0; q < found; q++) {
+      double square = 0;
+      for (size_t c = 0; c < 3; c++) square += pow(x[index[q] * 3 + c] - x[reached[r] * 3 + c], 2);
+      if (on_line[q] || square > step * step) continue;
+      on_line[q] = true;
+      reached[count++] = index[q];
+    }
+}
+
+/* Keeps the nearer half of the neighbours; the others become the nearest ones that stand off the line along axis: off
+ * the line itself too, which bends away from its axis, where there are enough such. */
 static void look_beside(const batten_orient_graph *g, const batten_tree *tree, size_t i, const double *axis) {
-  size_t index[WIDE], keep = g->k / 2, found;
+  size_t index[WIDE], keep = g->k / 2, found, beside = 0;
   double distance[WIDE];
+  bool on_line[WIDE];
   const double *x = g->points;
   found = batten_tree_nearest(tree, x + i * 3, WIDE, i, index, distance);
+  follow_line(g, i, found, index, STEP * distance[1], on_line);
+  for (size_t q = keep; q < found; q++) beside += !on_line[q];
+  bool follow = beside >= g->k - keep;
   for (size_t q = keep; q < found && keep < g->k; q++) {
     double e[3];
     for (int c = 0; c < 3; c++) e[c] = x[index[q] * 3 + (size_t)c] - x[i * 3 + (size_t)c];
     double along = dot(3, e, axis);
+    beside -= follow && !on_line[q];
+    bool last = follow ? beside < g->k - keep : found - q <= g->k - keep;
+    if (follow && on_line[q]) continue;
     /* off by 30 degrees, or no more candidates than places */
-    if (along * along > 0.75 * dot(3, e, e) && found - q > g->k - keep) continue;
+    if (along * along > 0.75 * dot(3, e, e) && !last) continue;
     g->index[i * g->k + keep] = index[q];
     g->distance[i * g->k + keep++] = distance[q];
   }
