@@ -70,8 +70,13 @@ static void compare(batten_context *ctx, const char *what, const cloud *c, bool 
 }
 
 static void test_against_dense(batten_context *ctx) {
-  cloud c = make_cloud(3, 3300);
-  compare(ctx, "r", &c, false, 2, NULL, 1e-6, 2);
+  cloud c = make_sphere(4000);
+  compare(ctx, "r, 4,000 points of a surface", &c, false, 2, NULL, 1e-6, 2);
+  free_cloud(&c);
+  c = make_cloud(3, 8000);
+  compare(ctx, "r, 8,000 points of a volume", &c, false, 2, NULL, 1e-6, 2);
+  free_cloud(&c);
+  c = make_cloud(3, 3300);
   double *rho = malloc(c.count * sizeof *rho);
   for (size_t i = 0; i < c.count; i++) rho[i] = i % 3 ? 0 : 0.02 * (double)(i % 7);
   compare(ctx, "r, smoothing of some", &c, false, 2, rho, 1e-6, 1);
@@ -255,15 +260,17 @@ static batten_status evaluate_small(batten_context *ctx, void *arg) {
 static void test_choice(batten_context *ctx) {
   cloud c = make_sphere(40000);
   batten_spline_data d = data_of(&c, false);
-  batten_spline_options o = options_of(2, BATTEN_SADDLE_AUTO, 1e-6);
+  batten_spline_options o = options_of(2, BATTEN_SADDLE_AUTO, 2e-9); /* for which the iteration goes on to 1e-9 */
   batten_spline_info info = {0};
   double start = batten_now();
   batten_spline_free(fit(ctx, &d, &o, &info));
   print("bumpy sphere", c.count, batten_now() - start, &info);
   T_CHECK(info.saddle.method == BATTEN_SADDLE_ITERATIVE, "40,000 points: %s",
           batten_saddle_method_name(info.saddle.method));
-  T_RATIO(info.saddle.iterations, 6, "iterations to 1e-6");
-  T_RATIO(info.saddle.residual_rows, 1e-6, "its residual");
+  const unsigned *to = info.saddle.iterations_to;
+  T_CHECK(to[1] > 0 && to[1] <= 6 && to[2] > 0 && to[2] <= 10, "%u iterations to 1e-6, %u to 1e-9", to[1], to[2]);
+  T_RATIO(info.saddle.residual_rows, 2e-9, "its residual");
+  o.saddle.accuracy = 1e-6;
   d.count = 3000;
   batten_spline_free(fit(ctx, &d, &o, &info));
   T_CHECK(info.saddle.method == BATTEN_SADDLE_CHOLESKY_MIXED && info.residual_max <= 1e-10, "3,000 points: %s",
