@@ -139,7 +139,7 @@ static void down_task(void *arg, size_t index) {
 /* ---- a product ---- */
 
 /* One translates to 128 cells, which takes some hundredths of a second: a group is short enough for a cancel. */
-enum { ACROSS_GROUP = FMM_GROUP / 4 };
+enum { ACROSS_GROUP = FMM_GROUP / 8 };
 
 /* Tasks in groups of at most FMM_GROUP, each with its own scratch. */
 static batten_status run(batten_context *ctx, pass *p, size_t tasks, size_t group, void (*task)(void *, size_t),
