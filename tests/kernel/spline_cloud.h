@@ -12,24 +12,23 @@ typedef struct cloud {
   double *points, *values, *gradients;
 } cloud;
 
-/* No polynomial of low degree. */
+/* A function that no polynomial of low degree equals, and its gradient (NULL: not wanted). */
 static inline double smooth(unsigned n, const double *x, double *g) {
   const double k[3] = {3, 2, -4};
   double t = 0.3;
   for (unsigned a = 0; a < n; a++) t += k[a] * x[a];
-  for (unsigned a = 0; a < n; a++) g[a] = k[a] * cos(t) + (a == 0 ? 0.4 * x[0] : 0);
+  for (unsigned a = 0; a < n && g; a++) g[a] = k[a] * cos(t) + (a == 0 ? 0.4 * x[0] : 0);
   return sin(t) + 0.2 * x[0] * x[0];
 }
 
 /* Points of the unit box that keep some distance (jittered additive sequence); their coordinates are multiples of
  * 2^-24, so that with 7e6 added they are still exact. */
-static inline cloud make_cloud(unsigned n, size_t count) {
+static inline cloud make_cloud_by(unsigned n, size_t count, uint64_t seed) {
   static const double step[4][3] = {{0},
-                                    {0},
+                                    {0.6180339887498949},
                                     {0.7548776662466927, 0.5698402909980532},
                                     {0.8191725133961645, 0.6710436067037893, 0.5497004779019703}};
   cloud c = {.n = n, .count = count};
-  uint64_t seed = 100 * n + count;
   c.points = malloc(count * n * sizeof(double));
   c.values = malloc(count * sizeof(double));
   c.gradients = malloc(count * n * sizeof(double));
@@ -40,6 +39,8 @@ static inline cloud make_cloud(unsigned n, size_t count) {
   for (size_t i = 0; i < count; i++) c.values[i] = smooth(n, c.points + i * n, c.gradients + i * n);
   return c;
 }
+
+static inline cloud make_cloud(unsigned n, size_t count) { return make_cloud_by(n, count, 100 * n + count); }
 
 static inline void free_cloud(cloud *c) {
   free(c->points);

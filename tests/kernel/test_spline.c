@@ -1,65 +1,12 @@
 /* Fitting of volume splines. */
 #include "basis/green.h"
 #include "basis/polynomial.h"
-#include "tap.h"
+#include "spline_cloud.h"
 
-#include <batten/spline.h>
 #include <float.h>
 
-typedef struct cloud {
-  unsigned n;
-  size_t count;
-  double *points, *values, *gradients;
-} cloud;
-
-/* A smooth function of up to three variables that no polynomial of degree 3 equals, and its gradient. */
-static double smooth(unsigned n, const double *x, double *g) {
-  const double k[3] = {3, 2, -4};
-  double t = 0.3;
-  for (unsigned a = 0; a < n; a++) t += k[a] * x[a];
-  for (unsigned a = 0; a < n && g; a++) g[a] = k[a] * cos(t) + (a == 0 ? 0.4 * x[0] : 0);
-  return sin(t) + 0.2 * x[0] * x[0];
-}
-
-/* Points of the unit box that keep some distance (jittered additive sequence), with the smooth function on them. */
-static cloud make_cloud(unsigned n, size_t count, uint64_t seed) {
-  static const double step[3][3] = {{0.6180339887498949, 0, 0},
-                                    {0.7548776662466927, 0.5698402909980532, 0},
-                                    {0.8191725133961645, 0.6710436067037893, 0.5497004779019703}};
-  cloud c = {.n = n, .count = count};
-  c.points = malloc(count * n * sizeof(double));
-  c.values = malloc(count * sizeof(double));
-  c.gradients = malloc(count * n * sizeof(double));
-  for (size_t i = 0; i < count; i++) {
-    for (unsigned a = 0; a < n; a++) {
-      double whole, jitter = 0.2 * pow((double)count, -1.0 / n) * t_uniform(&seed);
-      c.points[i * n + a] = modf(0.5 + (double)i * step[n - 1][a] + jitter, &whole);
-    }
-    c.values[i] = smooth(n, c.points + i * n, c.gradients + i * n);
-  }
-  return c;
-}
-static void free_cloud(cloud *c) {
-  free(c->points);
-  free(c->values);
-  free(c->gradients);
-}
-
-static batten_spline_data data_of(const cloud *c, bool hermite) {
-  batten_spline_data d = batten_spline_data_default();
-  d.n = c->n;
-  d.count = c->count;
-  d.points = c->points;
-  d.values = c->values;
-  if (hermite) {
-    d.gradient_count = c->count;
-    d.gradients = c->gradients;
-  }
-  return d;
-}
-
-static batten_spline *fit(batten_context *ctx, const batten_spline_data *d, unsigned m, double smoothing,
-                          batten_spline_info *info) {
+static batten_spline *fit_by(batten_context *ctx, const batten_spline_data *d, unsigned m, double smoothing,
+                             batten_spline_info *info) {
   batten_spline_options o = batten_spline_options_default();
   o.m = m;
   o.smoothing = smoothing;
@@ -83,21 +30,21 @@ static void test_residuals(batten_context *ctx) {
       if (!batten_green_exists(n, m)) continue;
       /* On a line the kernels' condition grows like N^(2m-1): fewer points as m rises. */
       size_t count = n > 1 ? 500 : m < 3 ? 500 : m == 3 ? 200 : 60;
-      cloud c = make_cloud(n, count, n * 10 + m);
+      cloud c = make_cloud_by(n, count, n * 10 + m);
       batten_spline_data d = data_of(&c, false);
       batten_spline_info info;
-      batten_spline *s = fit(ctx, &d, m, 0, &info);
+      batten_spline *s = fit_by(ctx, &d, m, 0, &info);
       T_RATIO(info.residual_max, 1e-10, "n = %u, m = %u, N = %zu: residual (%s, rcond %.1e)", n, m, count,
               batten_saddle_method_name(info.saddle.method), info.saddle.rcond);
       T_CHECK(info.gradient_residual_max == 0 && info.energy > 0, "no gradients, energy %.3g", info.energy);
       batten_spline_free(s);
       free_cloud(&c);
     }
-  cloud c = make_cloud(3, 4000, 1);
+  cloud c = make_cloud_by(3, 4000, 1);
   batten_spline_data d = data_of(&c, false);
   batten_spline_info info;
   double start = batten_now();
-  batten_spline *s = fit(ctx, &d, 2, 0, &info);
+  batten_spline *s = fit_by(ctx, &d, 2, 0, &info);
   printf("# N = 4000: %.2f s, %s\n", batten_now() - start, batten_saddle_method_name(info.saddle.method));
   T_RATIO(info.residual_max, 1e-10, "n = 3, m = 2, N = 4000: residual");
   double worst = 0;
@@ -113,7 +60,7 @@ static void test_polynomials(batten_context *ctx) {
   for (unsigned n = 1; n <= 3; n++)
     for (unsigned m = 1; m <= 4; m++) {
       if (!batten_green_exists(n, m)) continue;
-      cloud c = make_cloud(n, n == 1 ? 40 : 150, 7 * n + m);
+      cloud c = make_cloud_by(n, n == 1 ? 40 : 150, 7 * n + m);
       batten_polynomial basis = batten_polynomial_basis(n, m - 1);
       double k[BATTEN_POLYNOMIAL_MAX], sums[10], lower = INFINITY, upper = -INFINITY, worst = 0;
       uint64_t seed = 4;
@@ -127,7 +74,7 @@ static void test_polynomials(batten_context *ctx) {
         upper = fmax(upper, sums[0]);
       }
       batten_spline_data d = data_of(&c, false);
-      batten_spline *s = fit(ctx, &d, m, 0, NULL);
+      batten_spline *s = fit_by(ctx, &d, m, 0, NULL);
       double slope = 0, worst_slope = 0;
       for (int i = 0; i < 200; i++) {
         double x[3] = {0}, v, g[3];
@@ -152,16 +99,16 @@ static void test_hermite(batten_context *ctx) {
   for (unsigned n = 1; n <= 3; n++)
     for (unsigned m = 1; m <= 4; m++) {
       if (!batten_green_exists(n, m) || 2 * m - n <= 2 || (n == 2 && m == 4)) continue;
-      cloud c = make_cloud(n, n == 1 ? 20 : 120, 9 * n + m);
+      cloud c = make_cloud_by(n, n == 1 ? 20 : 120, 9 * n + m);
       batten_spline_data d = data_of(&c, true);
       batten_spline_info info;
-      batten_spline *s = fit(ctx, &d, m, 0, &info);
+      batten_spline *s = fit_by(ctx, &d, m, 0, &info);
       T_RATIO(info.residual_max, 1e-10, "n = %u, m = %u with gradients: residual of the values (rcond %.1e)", n, m,
               info.saddle.rcond);
       T_RATIO(info.gradient_residual_max, 1e-10, "n = %u, m = %u with gradients: residual of the gradients", n, m);
       /* More data, better elsewhere. */
       batten_spline_data plain = data_of(&c, false);
-      batten_spline *p = fit(ctx, &plain, m, 0, NULL);
+      batten_spline *p = fit_by(ctx, &plain, m, 0, NULL);
       double with = 0, without = 0;
       uint64_t seed = 8;
       for (int i = 0; i < 300; i++) {
@@ -187,7 +134,7 @@ static void test_hermite(batten_context *ctx) {
       d.gradient_count = SOME;
       d.gradient_at = at;
       d.gradients = some;
-      s = fit(ctx, &d, m, 0, &info);
+      s = fit_by(ctx, &d, m, 0, &info);
       for (size_t q = 0; q < SOME; q++) {
         double g[3];
         batten_spline_evaluate(ctx, s, 1, c.points + at[q] * n, NULL, g, NULL);
@@ -227,7 +174,7 @@ static void test_cubic(batten_context *ctx) {
   d.points = x;
   d.values = f;
   batten_spline_info info;
-  batten_spline *s = fit(ctx, &d, 2, 0, &info);
+  batten_spline *s = fit_by(ctx, &d, 2, 0, &info);
   /* The 4th derivative of |x|^3 is 12 delta: the integral of U''^2 over the unit box is 12 w'Kw. */
   double bending = 0;
   for (int i = 0; i + 1 < N; i++)
@@ -261,7 +208,7 @@ static void test_linear(batten_context *ctx) {
   d.count = 3;
   d.points = x;
   d.values = f;
-  batten_spline *s = fit(ctx, &d, 1, 0, NULL);
+  batten_spline *s = fit_by(ctx, &d, 1, 0, NULL);
   for (int i = 0; i < 4; i++)
     T_RATIO(fabs(value_at(ctx, s, at + i) - want[i]), 1e-13, "polyline at %g: %g", at[i], want[i]);
   batten_spline_free(s);
@@ -273,7 +220,7 @@ static void test_loo(batten_context *ctx) {
     const bool hermite = run == 1, per_point = run == 3;
     const double rho = run == 2 ? 0.05 : 0;
     const unsigned m = run == 0 ? 2 : 3;
-    cloud c = make_cloud(3, 40, 60 + (uint64_t)run);
+    cloud c = make_cloud_by(3, 40, 60 + (uint64_t)run);
     double each[40], sum = 0;
     for (int i = 0; i < 40; i++) each[i] = 0.001 * (1 + i % 5);
     batten_spline_data d = data_of(&c, hermite);
@@ -340,7 +287,7 @@ enum { PROBES = 60 };
 /* U at fixed places of the cloud's box under x -> rotation x * scale + shift. */
 static void probe(batten_context *ctx, const cloud *c, unsigned m, const double rotation[9], double scale,
                   double shift, const size_t *order, double out[PROBES]) {
-  cloud moved = make_cloud(c->n, c->count, 1);
+  cloud moved = make_cloud_by(c->n, c->count, 1);
   batten_spline_data d = data_of(&moved, false);
   for (size_t i = 0; i < c->count; i++) {
     size_t from = order ? order[i] : i;
@@ -354,7 +301,7 @@ static void probe(batten_context *ctx, const cloud *c, unsigned m, const double 
       moved.points[3 * i + a] = x * scale + shift;
     }
   }
-  batten_spline *s = fit(ctx, &d, m, 0, NULL);
+  batten_spline *s = fit_by(ctx, &d, m, 0, NULL);
   uint64_t seed = 15;
   for (int i = 0; i < PROBES; i++) {
     double p[3], x[3];
@@ -379,7 +326,7 @@ static double difference(const double a[PROBES], const double b[PROBES]) {
 
 static void test_invariance(batten_context *ctx) {
   for (unsigned m = 2; m <= 3; m++) {
-    cloud c = make_cloud(3, 200, 33);
+    cloud c = make_cloud_by(3, 200, 33);
     for (size_t i = 0; i < 600; i++) c.points[i] = floor(c.points[i] * 0x1p20) * 0x1p-20;
     double base[PROBES], other[PROBES];
     size_t order[200];
@@ -405,10 +352,10 @@ static void test_invariance(batten_context *ctx) {
 /* ---- smoothing ---- */
 
 static void test_smoothing(batten_context *ctx) {
-  cloud c = make_cloud(2, 80, 12);
+  cloud c = make_cloud_by(2, 80, 12);
   batten_spline_data d = data_of(&c, false);
   batten_spline_info info;
-  batten_spline *s = fit(ctx, &d, 2, 0.02, &info);
+  batten_spline *s = fit_by(ctx, &d, 2, 0.02, &info);
   batten_spline_parts parts;
   batten_spline_get_parts(s, &parts);
   double worst = 0, largest = 0;
@@ -423,7 +370,7 @@ static void test_smoothing(batten_context *ctx) {
   batten_spline_free(s);
 
   /* rho -> infinity: the least-squares plane, here from its 3 x 3 normal equations by Cramer's rule. */
-  s = fit(ctx, &d, 2, 1e9, NULL);
+  s = fit_by(ctx, &d, 2, 1e9, NULL);
   double a[3][3] = {{0}}, b[3] = {0};
   for (size_t i = 0; i < c.count; i++) {
     double row[3] = {1, c.points[2 * i], c.points[2 * i + 1]};
@@ -445,7 +392,7 @@ static void test_smoothing(batten_context *ctx) {
           "rho = 1e9: least-squares plane");
   batten_spline_free(s);
   for (double rho = 1e12; rho < 1e20; rho *= 3) {
-    s = fit(ctx, &d, 2, rho, &info);
+    s = fit_by(ctx, &d, 2, rho, &info);
     T_CHECK(info.energy >= 0 && info.energy < 1e-9, "rho = %.0e: energy %.2g, rounding is not negative", rho,
             info.energy);
     batten_spline_free(s);
@@ -473,64 +420,64 @@ static void test_edges(batten_context *ctx) {
   d.points = x;
   d.values = f;
   batten_spline_info info;
-  batten_spline *s = fit(ctx, &d, 2, 0, &info);
+  batten_spline *s = fit_by(ctx, &d, 2, 0, &info);
   double at[3] = {0.5, 0.25, 2};
   T_RATIO(fabs(value_at(ctx, s, at) - 8), 1e-14, "4 points in space: the linear function through them");
   T_CHECK(isnan(info.loo_rms) && info.loo_samples == 0 && info.energy == 0, "no leave-one-out error, no energy");
   batten_spline_free(s);
   d.count = 5;
-  s = fit(ctx, &d, 2, 0, &info);
+  s = fit_by(ctx, &d, 2, 0, &info);
   T_RATIO(info.residual_max, 1e-14, "5 points");
   batten_spline_free(s);
   d.count = 1;
   d.n = 1;
-  s = fit(ctx, &d, 1, 0, &info);
+  s = fit_by(ctx, &d, 1, 0, &info);
   T_CHECK(value_at(ctx, s, at) == 1, "one point on a line: the constant");
   batten_spline_free(s);
   /* One value and one gradient are a linear function. */
   double g[3] = {2, -1, 3};
   d.n = 1, d.count = 1, d.gradient_count = 1, d.gradients = g;
-  s = fit(ctx, &d, 2, 0, &info);
+  s = fit_by(ctx, &d, 2, 0, &info);
   T_CHECK(value_at(ctx, s, at) == 2 && info.gradient_residual_max == 0, "a value and a slope");
   batten_spline_free(s);
 
   /* A surface with its normals: all values equal. */
-  cloud c = make_cloud(3, 60, 2);
+  cloud c = make_cloud_by(3, 60, 2);
   for (size_t i = 0; i < c.count; i++) c.values[i] = 0;
   d = data_of(&c, true);
-  s = fit(ctx, &d, 3, 0, &info);
+  s = fit_by(ctx, &d, 3, 0, &info);
   T_RATIO(fmax(info.residual_max, info.gradient_residual_max), 1e-10, "all values 0, gradients given");
   batten_spline_free(s);
   d = data_of(&c, false);
-  s = fit(ctx, &d, 2, 0, &info);
+  s = fit_by(ctx, &d, 2, 0, &info);
   T_CHECK(value_at(ctx, s, at) == 0 && info.residual_max == 0 && info.loo_rms == 0, "all values 0");
   batten_spline_free(s);
   free_cloud(&c);
 }
 
 static void test_units_of_value(batten_context *ctx) {
-  cloud c = make_cloud(3, 100, 3);
+  cloud c = make_cloud_by(3, 100, 3);
   batten_spline_data d = data_of(&c, false);
   double at[3] = {0.3, 0.4, 0.5};
-  batten_spline *s = fit(ctx, &d, 2, 0, NULL);
+  batten_spline *s = fit_by(ctx, &d, 2, 0, NULL);
   double base = value_at(ctx, s, at);
   batten_spline_free(s);
   for (int k = -300; k <= 300; k += 600) {
     for (size_t i = 0; i < c.count; i++) c.values[i] = ldexp(smooth(3, c.points + 3 * i, NULL), k);
-    s = fit(ctx, &d, 2, 0, NULL);
+    s = fit_by(ctx, &d, 2, 0, NULL);
     T_CHECK(value_at(ctx, s, at) == ldexp(base, k), "values times 2^%d: the same bits", k);
     batten_spline_free(s);
   }
   for (size_t i = 0; i < c.count; i++) c.values[i] = smooth(3, c.points + 3 * i, NULL) + 1e8;
   batten_spline_info info;
-  s = fit(ctx, &d, 2, 0, &info);
+  s = fit_by(ctx, &d, 2, 0, &info);
   T_RATIO(fabs(value_at(ctx, s, at) - 1e8 - base), 1e-6, "values about 1e8");
   batten_spline_free(s);
   free_cloud(&c);
 }
 
 static void test_bad_input(batten_context *ctx) {
-  cloud c = make_cloud(3, 50, 5);
+  cloud c = make_cloud_by(3, 50, 5);
   batten_spline_data good = data_of(&c, false), d = good;
   batten_spline_options defaults = batten_spline_options_default(), o = defaults;
   batten_spline *s = NULL;
@@ -668,10 +615,10 @@ static void test_flat(batten_context *ctx) {
 static void test_bytes(void) {
   for (int hermite = 0; hermite < 2; hermite++) {
     batten_context *ctx = t_context(NULL, NULL, 2);
-    cloud c = make_cloud(3, hermite ? 200 : 800, 4);
+    cloud c = make_cloud_by(3, hermite ? 200 : 800, 4);
     batten_spline_data d = data_of(&c, hermite);
     batten_spline_info info;
-    batten_spline *s = fit(ctx, &d, hermite ? 3 : 2, 0, &info);
+    batten_spline *s = fit_by(ctx, &d, hermite ? 3 : 2, 0, &info);
     double ratio = (double)batten_bytes_peak(ctx) /
                    (double)batten_spline_bytes(info.saddle.method, 3, hermite ? 3 : 2, c.count, d.gradient_count);
     T_CHECK(ratio <= 1 && ratio > 0.5, "predicted bytes (%s): peak is %.3f of them",
@@ -712,7 +659,7 @@ int main(void) {
   T_CHECK(batten_bytes_in_use(ctx) == 0, "nothing stays in the context");
   batten_context_free(ctx);
   test_bytes();
-  cloud c = make_cloud(3, 30, 5);
+  cloud c = make_cloud_by(3, 30, 5);
   batten_spline_data d = data_of(&c, true);
   d.gradient_count = 6;
   t_fail_every_allocation("batten_spline_fit", fit_once, &d);
