@@ -31,8 +31,8 @@ typedef struct direct_plan {
 
 enum { SUM_LANES = 16 };
 
-FAST_SUMS static double sum_r(size_t n, const double *x, const double *y, const double *z, const double *w,
-                              const double *p) {
+NOT_SANITIZED FAST_SUMS static double sum_r(size_t n, const double *x, const double *y, const double *z,
+                                            const double *w, const double *p) {
   double s[SUM_LANES] = {0}, total = 0;
   for (size_t j = 0; j < n; j += SUM_LANES)
     for (size_t l = 0; l < SUM_LANES; l++) {
@@ -43,8 +43,8 @@ FAST_SUMS static double sum_r(size_t n, const double *x, const double *y, const 
   return -total;
 }
 
-FAST_SUMS static double sum_r3(size_t n, const double *x, const double *y, const double *z, const double *w,
-                               const double *p) {
+NOT_SANITIZED FAST_SUMS static double sum_r3(size_t n, const double *x, const double *y, const double *z,
+                                             const double *w, const double *p) {
   double s[SUM_LANES] = {0}, total = 0;
   for (size_t j = 0; j < n; j += SUM_LANES)
     for (size_t l = 0; l < SUM_LANES; l++) {
