@@ -121,7 +121,10 @@ static void run_collection(batten_context *ctx, const char *folder, DIR *open) {
     char path[4096];
     batten_qp_file file;
     if (!strstr(name, ".mat")) continue;
-    snprintf(path, sizeof path, "%s/%s", folder, name);
+    if ((size_t)snprintf(path, sizeof path, "%s/%s", folder, name) >= sizeof path) {
+      T_CHECK(false, "%s/%s: the path is too long", folder, name);
+      continue;
+    }
     bool is_asked = listed(name, asked, sizeof asked / sizeof *asked, true);
     bool is_definite = listed(name, definite, sizeof definite / sizeof *definite, false);
     if (batten_read_qp(ctx, path, &file) < 0) {
