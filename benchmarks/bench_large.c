@@ -1,9 +1,10 @@
 /* Fits of many points by iteration on fast sums, as Markdown tables: one for each accuracy, a row for each N, and how
- * the time grows from row to row. Random points of a bumpy sphere, the values of a ball; or points of a file, all of
- * them. Usage:
- *   bench-large [--accuracy EPS]... [--order M] [--data FILE] [--dense N_MAX] [--json FILE] [N ...]
+ * the time grows from row to row. Random points of a bumpy sphere, or of a cube, the values of a ball; or points of a
+ * file, all of them. Usage:
+ *   bench-large [--accuracy EPS]... [--order M] [--cube] [--data FILE] [--dense N_MAX] [--json FILE] [N ...]
  *   --accuracy  of the residual on direct rows; default 1e-6, then 2e-9: the iteration goes on to half of that
  *   --order     2 (kernel r, the default), 3 (r^3)
+ *   --cube      points that fill a volume, in place of a surface
  *   --data      lines "x y z", or "x y z value"; without values those of a ball around the points
  *   --dense     a fit by factors too, up to that N: Cholesky, from 2000 on its mixed form
  *   N           default 10000 40000 100000 300000
@@ -24,6 +25,7 @@ static const double REPEAT_BELOW_S = 0.3;
 
 typedef struct settings {
   unsigned order, threads;
+  bool cube;
   const char *data;
   size_t dense_most, sizes[MOST_SIZES], size_count;
   double accuracies[MOST_ACCURACIES];
@@ -54,6 +56,14 @@ static void bumpy_sphere(size_t n, unsigned order, double *points, double *value
     double radius = 1 + 0.1 * sin(5 * a) * s * s + 0.05 * cos(9 * z);
     x[0] = radius * s * cos(a), x[1] = radius * s * sin(a), x[2] = radius * z;
     values[i] = ball(x, (double[3]){0}, 1, order);
+  }
+}
+
+static void cube(size_t n, unsigned order, double *points, double *values) {
+  uint64_t seed = 1;
+  for (size_t i = 0; i < n; i++) {
+    for (int a = 0; a < 3; a++) points[3 * i + (size_t)a] = 2 * t_uniform(&seed) - 1;
+    values[i] = ball(points + 3 * i, (double[3]){0}, 1, order);
   }
 }
 
@@ -112,7 +122,7 @@ static double *read_points(const char *path, unsigned order, size_t *count) {
 static double *make_data(const settings *s, size_t *n) {
   if (s->data) return read_points(s->data, s->order, n);
   double *points = malloc(4 * *n * sizeof *points);
-  if (points) bumpy_sphere(*n, s->order, points, points + 3 * *n);
+  if (points) (s->cube ? cube : bumpy_sphere)(*n, s->order, points, points + 3 * *n);
   return points;
 }
 
@@ -221,7 +231,11 @@ static double exponent(const row *rows, size_t count) {
 }
 
 static void print_head(const settings *s, double accuracy) {
-  printf("\n%s, order %u, accuracy %g\n\n", s->data ? s->data : "bumpy sphere, seed 1", s->order, accuracy);
+  printf("\n%s, order %u, accuracy %g\n\n",
+         s->data   ? s->data
+         : s->cube ? "cube, seed 1"
+                   : "bumpy sphere, seed 1",
+         s->order, accuracy);
   printf(
       "| N | levels | set-up s | its 1e-3 / 1e-6 / 1e-9 (all) | s per product | solve s | set-up + solve s | grows "
       "as N^ "
@@ -317,6 +331,10 @@ static size_t table(const settings *s, double accuracy, FILE *json, size_t told)
 static bool read_arguments(int argc, char **argv, settings *s, const char **json) {
   for (int i = 1; i < argc; i++) {
     const char *word = argv[i], *value = i + 1 < argc ? argv[i + 1] : NULL;
+    if (!strcmp(word, "--cube")) {
+      s->cube = true;
+      continue;
+    }
     if (strncmp(word, "--", 2) == 0 && !value) return false;
     if (!strcmp(word, "--accuracy") && s->accuracy_count < MOST_ACCURACIES)
       s->accuracies[s->accuracy_count++] = strtod(argv[++i], NULL);
@@ -341,7 +359,7 @@ int main(int argc, char **argv) {
   const char *path = NULL;
   if (!read_arguments(argc, argv, &s, &path)) {
     fprintf(stderr,
-            "usage: bench-large [--accuracy EPS]... [--order M] [--data FILE] [--dense N_MAX] [--json FILE] "
+            "usage: bench-large [--accuracy EPS]... [--order M] [--cube] [--data FILE] [--dense N_MAX] [--json FILE] "
             "[N ...]\n");
     return 2;
   }

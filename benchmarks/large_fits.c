@@ -25,10 +25,14 @@ static double *read_all(const char *path, size_t *count) {
   return out;
 }
 
-/* By sums of that accuracy, 0: by direct ones. */
-static batten_status values_at(batten_context *ctx, batten_spline *s, double accuracy, size_t count,
+/* Pairs of centre and place up to which values are summed directly, in a second or two: less than operators of fast
+ * sums take to make. */
+static const double DIRECT_MOST = 3e8;
+
+static batten_status values_at(batten_context *ctx, batten_spline *s, double accuracy, size_t terms, size_t count,
                                const double *places, double *out) {
-  if (accuracy == 0) return batten_spline_evaluate(ctx, s, count, places, out, NULL, NULL);
+  if ((double)terms * (double)count <= DIRECT_MOST)
+    return batten_spline_evaluate(ctx, s, count, places, out, NULL, NULL);
   batten_spline_evaluator *e = NULL;
   batten_status status = batten_spline_evaluator_new(ctx, s, accuracy, &e);
   if (status >= 0) status = batten_spline_evaluator_evaluate(ctx, e, count, places, out, NULL, NULL);
@@ -69,10 +73,8 @@ int main(int argc, char **argv) {
   double start = batten_now();
   batten_status status = batten_spline_fit(ctx, &d, &o, &s, &info);
   double fitted = batten_now();
-  double sums = 0; /* of an iteration: so accurate that what it leaves shows */
-  if (status >= 0 && info.saddle.method == BATTEN_SADDLE_ITERATIVE)
-    sums = fmin(fmax(0.01 * o.saddle.accuracy, 1e-12), 1e-3);
-  if (status >= 0) status = values_at(ctx, s, sums, queries, places, out);
+  double sums = fmin(fmax(0.01 * o.saddle.accuracy, 1e-12), 1e-3); /* what an iteration leaves shows */
+  if (status >= 0) status = values_at(ctx, s, sums, count, queries, places, out);
   double end = batten_now();
   if (status < 0) fprintf(stderr, "%s\n", batten_error(ctx));
   char path[4096];

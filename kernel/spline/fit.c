@@ -167,10 +167,11 @@ static batten_status fail_singular(const fit *t, const char *detail) {
       s->count, s->m - 1, s->m, detail);
 }
 
-/* From so many unknowns on iteration takes less time than the factors do, for the kernels that it takes easily: r,
- * and r^2 ln r in the plane (benchmarks/bench_large). Its residual is then what saddle.accuracy asks for, not
- * rounding: the limit is kept well above where the times meet. */
-enum { ITERATIVE_FROM = 12000 };
+/* From so many unknowns on iteration takes half the time of factors, and less with every point, for the kernels that
+ * it takes easily: r, and r^2 ln r in the plane (benchmarks/bench_large). The times meet at some 2,500; its residual
+ * is what saddle.accuracy asks for, not rounding, and there are no leave-one-out errors: not worth the first second.
+ */
+enum { ITERATIVE_FROM = 6000 };
 
 /* Where no factor has room, iteration is tried from so many unknowns on, whatever the kernel. */
 enum { ITERATIVE_FROM_SMALL = 2000 };

@@ -260,13 +260,29 @@ static batten_status factor_portion(batten_saddle *s, factoring *f) {
   return BATTEN_OK;
 }
 
+/* Only now are the domains known: those of unknowns that fill a volume are larger than was foreseen. */
+static batten_status check_room(const batten_saddle *s, const saddle_iterative *it) {
+  const batten_la_real real = s->options.smooth_kernel ? BATTEN_LA_DOUBLE : BATTEN_LA_FLOAT;
+  const size_t available = batten_bytes_available(s->ctx);
+  size_t bytes = batten_saddle_domain_work(it->domain_most, s->matrix.k) * it->slots;
+  for (size_t q = 0; q < it->level_count; q++)
+    for (size_t d = 0; d < it->levels[q].domain_count; d++)
+      batten_add(bytes, batten_saddle_domain_bytes(real, it->levels[q].domains[d].count, s->matrix.k), &bytes);
+  if (bytes <= available) return BATTEN_OK;
+  return batten_fail(
+      s->ctx, BATTEN_E_TOO_LARGE,
+      "matrix.n: local solves of %zu rows with up to %zu neighbours take %zu bytes, the context has "
+      "%zu left; raise memory_limit, use fewer points, or give opt.overlap = %g, which may not converge",
+      s->matrix.n, it->domain_most, bytes, available, saddle_overlap_least(&s->options));
+}
+
 batten_status batten_saddle_domains_factor(batten_saddle *s, saddle_iterative *it) {
   enum { PORTION = 16 }; /* domains of a slot between two progress calls: about 0.1 s */
   size_t total = 0, done = 0;
   factoring f = {.s = s, .it = it, .work_bytes = batten_saddle_domain_work(it->domain_most, s->matrix.k)};
-  batten_status st = BATTEN_OK;
+  batten_status st = check_room(s, it);
   for (size_t q = 0; q < it->level_count; q++) total += it->levels[q].domain_count;
-  if (total == 0) return BATTEN_OK;
+  if (st < 0 || total == 0) return st;
   f.work = batten_alloc_array(s->ctx, it->slots, f.work_bytes);
   if (!f.work) return BATTEN_E_NOMEM;
   for (size_t q = 0; q < it->level_count; q++) {

@@ -27,10 +27,6 @@ enum { LARGE = 150000 };
 
 enum { ROWS_CHECKED = 1000, STEPS_EXPECTED = 24 };
 
-static double overlap_of(const batten_saddle_options *o) {
-  return o->overlap > 0 ? o->overlap : o->smooth_kernel ? 1 : 0.5;
-}
-
 static double needed_within(const batten_saddle_options *o, size_t n) {
   if (o->smooth_kernel) return n > LARGE ? SMOOTH_LARGE : SMOOTH_SMALL;
   return n > LARGE ? WITHIN_LARGE : WITHIN_SMALL;
@@ -66,10 +62,16 @@ static size_t vectors(batten_saddle_krylov krylov) {
   return 5 + (krylov == BATTEN_SADDLE_CG ? 3 : 2 * STEPS_EXPECTED);
 }
 
+/* Members of a domain, where unknowns lie on a surface: whole rings of neighbours make its sides so much longer. */
+static size_t members_foreseen(const batten_saddle_options *o, size_t own) {
+  const size_t least = own + saddle_added(own, saddle_overlap_least(o));
+  const double side = sqrt((double)own) + (o->smooth_kernel ? 8.6 : 5.6);
+  return o->overlap > 0 || side * side < (double)least ? least : (size_t)(side * side);
+}
+
 /* m: for its sums, NULL: they take nothing. */
 static size_t bytes_with(const batten_saddle_matrix *m, const batten_saddle_options *o, batten_saddle_krylov krylov,
                          unsigned slots, size_t n, size_t k) {
-  const double overlap = overlap_of(o);
   const batten_la_real real = o->smooth_kernel ? BATTEN_LA_DOUBLE : BATTEN_LA_FLOAT;
   size_t count = n, held = sizeof(saddle_iterative), most = 0, cutting = 0;
   if (n > SIZE_MAX / 4096) return SIZE_MAX;
@@ -79,15 +81,15 @@ static size_t bytes_with(const batten_saddle_matrix *m, const batten_saddle_opti
     grow(&held, count, (k + 2) * sizeof(double) + 2 * sizeof(size_t));
     if (count <= SADDLE_EXACT_MAX) break;
     size_t domains = batten_saddle_parts(count, SADDLE_OWN_MAX), own = count / domains + 1;
-    size_t members = own + saddle_added(own, overlap),
-           next = batten_saddle_parts(count, saddle_cell(count)) + SADDLE_EXTREMES;
     /* Domains have the size that halving gives, or twice that less one part where only some were too large. */
-    if (count / domains < SADDLE_OWN_MAX / 2) members = SADDLE_OWN_MAX + saddle_added(SADDLE_OWN_MAX, overlap);
-    grow(&held, count + saddle_added(count, overlap), sizeof(size_t));
+    if (count / domains < SADDLE_OWN_MAX / 2) own = SADDLE_OWN_MAX;
+    size_t members = members_foreseen(o, own),
+           next = batten_saddle_parts(count, saddle_cell(count)) + SADDLE_EXTREMES;
+    grow(&held, domains, members * sizeof(size_t));
     grow(&held, domains, sizeof(saddle_domain));
     grow(&held, domains, batten_saddle_domain_bytes(real, members, k));
     if (members > most) most = members;
-    if (count == n) cutting = count * (6 * 3 + 6 + SADDLE_GRAPH) * sizeof(double);
+    if (count == n) cutting = count * (6 * 3 + 7 + SADDLE_OVERLAP_MAX + SADDLE_GRAPH) * sizeof(double);
     batten_add(held, plan_bytes(m, accuracy_within(o, n), count, next), &held);
     count = next;
   }
@@ -182,7 +184,7 @@ batten_status batten_saddle_iterative_new(batten_saddle *s) {
   it->partial = batten_alloc_array(s->ctx, batten_saddle_blocks(n), SADDLE_DOTS * sizeof *it->partial);
   if (!it->partial) goto done;
 
-  st = batten_saddle_levels_new(s, it, overlap_of(&s->options));
+  st = batten_saddle_levels_new(s, it);
   if (st < 0) goto done;
   st = batten_saddle_domains_factor(s, it);
   if (st < 0) goto done;

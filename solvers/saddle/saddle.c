@@ -6,13 +6,13 @@
 #include <float.h>
 #include <string.h>
 
-#include "system.h"
+#include "schwarz.h"
 
 /* A step that gains less than this factor has stalled. */
 static const double STALL = 0.25;
 
 /* Of the iterative method: below 1e-13 rounding of the rows that are checked is what one would see. */
-static const double ACCURACY_MIN = 1e-13, ACCURACY_MAX = 0.1, OVERLAP_MAX = 4;
+static const double ACCURACY_MIN = 1e-13, ACCURACY_MAX = 0.1;
 
 /* Distances are compared by their squares. */
 static const double COORDINATE_MAX = 1e150;
@@ -187,8 +187,8 @@ static batten_status check_options(batten_context *ctx, const batten_saddle_opti
   if (!(o->products_accuracy == 0 || (o->products_accuracy > 0 && o->products_accuracy <= ACCURACY_MAX)))
     return batten_fail(ctx, BATTEN_E_INVALID, "opt.products_accuracy: %g; give up to %g, or 0 to have it chosen",
                        o->products_accuracy, ACCURACY_MAX);
-  if (!(o->overlap >= 0 && o->overlap <= OVERLAP_MAX))
-    return batten_fail(ctx, BATTEN_E_INVALID, "opt.overlap: %g; give 0 .. %g", o->overlap, OVERLAP_MAX);
+  if (!(o->overlap >= 0 && o->overlap <= SADDLE_OVERLAP_MAX))
+    return batten_fail(ctx, BATTEN_E_INVALID, "opt.overlap: %g; give 0 .. %d", o->overlap, SADDLE_OVERLAP_MAX);
   if ((int)o->krylov < BATTEN_SADDLE_KRYLOV_AUTO || (int)o->krylov > BATTEN_SADDLE_CG)
     return batten_fail(ctx, BATTEN_E_INVALID, "opt.krylov: %d; use one of batten_saddle_krylov", (int)o->krylov);
   if (o->iterations_max == 0) return batten_fail(ctx, BATTEN_E_INVALID, "opt.iterations_max: 0; must be positive");

@@ -25,6 +25,9 @@ enum {
   SADDLE_OWN_MAX = 512,    /* unknowns of a domain without the overlap: the domains have 256 to 512 */
   SADDLE_CELL_MAX = 8,     /* unknowns of which one goes to the next level, see saddle_cell() */
   SADDLE_GRAPH = 10,       /* nearest neighbours along which the overlap grows */
+  SADDLE_RINGS = 2,        /* of these that are taken as a whole */
+  SADDLE_RINGS_SMOOTH = 3, /* with a smooth kernel */
+  SADDLE_OVERLAP_MAX = 4,  /* times a domain's own unknowns */
   SADDLE_BLOCK = 16384,    /* entries of a vector that are summed up at a time */
   SADDLE_DOTS = 32         /* scalar products at a time */
 };
@@ -90,13 +93,17 @@ static inline size_t saddle_cell(size_t count) {
   return batten_saddle_parts(count, SADDLE_CELL_MAX) < SADDLE_EXACT_MAX / 2 ? SADDLE_CELL_MAX / 2 : SADDLE_CELL_MAX;
 }
 
-/* What a task takes in around its own unknowns. */
+/* What a domain takes in around its own unknowns at least, over these. */
+static inline double saddle_overlap_least(const batten_saddle_options *o) {
+  return o->overlap > 0 ? o->overlap : o->smooth_kernel ? 1 : 0.5;
+}
+
 static inline size_t saddle_added(size_t own, double overlap) { return (size_t)(overlap * (double)own); }
 
 /* ---- levels.c ---- */
 
 /* Makes it->levels, with domains whose factors are missing; phase "levels". SINGULAR: two unknowns are the same. */
-batten_status batten_saddle_levels_new(const batten_saddle *s, saddle_iterative *it, double overlap);
+batten_status batten_saddle_levels_new(const batten_saddle *s, saddle_iterative *it);
 void batten_saddle_levels_free(const batten_saddle *s, saddle_iterative *it);
 
 /* K[row[i]][col[j]] by whatever the caller gave. */

@@ -42,7 +42,7 @@ typedef struct batten_spline_options {
   size_t loo_samples;           /* leave-one-out errors of so many points, evenly drawn; SIZE_MAX = all, 0 = none.
                                    Default 256. */
   batten_saddle_options saddle; /* method, refinement, tolerance. ITERATIVE is for n = 2 and 3 and makes its products
-                                   by <batten/fmm.h>; AUTO chooses it from 12,000 unknowns N + nM on where 2m - n <= 2
+                                   by <batten/fmm.h>; AUTO chooses it from 6,000 unknowns N + nM on where 2m - n <= 2
                                    (kernels r and r^2 ln r), and where no factor fits the memory limit. */
 } batten_spline_options;
 BATTEN_API batten_spline_options batten_spline_options_default(void);
@@ -62,7 +62,8 @@ typedef struct batten_spline_info {
   double time_total_s;
 } batten_spline_info;
 
-/* Bytes at the peak of a fit, predicted; SIZE_MAX on overflow. ITERATIVE: with default options. */
+/* Bytes at the peak of a fit, predicted; SIZE_MAX on overflow. ITERATIVE: with default options, for points
+ * on a surface; where they fill a volume two to three times as much, which a fit finds out before it takes it. */
 BATTEN_API size_t batten_spline_bytes(batten_saddle_method method, unsigned n, unsigned m, size_t points,
                                       size_t gradients);
 

@@ -86,14 +86,15 @@ typedef struct batten_saddle_options {
                                   Misses are told by BATTEN_W_ACCURACY. */
 
   /* ITERATIVE, which does not look at refine_max and residual_tol. With smooth_kernel it keeps all local factors in
-   * double, and its overlap is 1. */
+   * double. */
   double accuracy;             /* aimed at: 2-norm of f - K w - P c over that of f less its best polynomial, on rows
                                   whose entries are computed afresh, 1000 of them at random. The products are made as
                                   accurate as that asks for. Misses are told by BATTEN_W_ACCURACY. Between 1e-13 and
                                   0.1. Default 1e-6. */
   double products_accuracy;    /* of the products at first, 0: chosen. Default 0. */
   double overlap;              /* unknowns that a local solve takes in around its own, over its own, up to 4; 0:
-                                  chosen, 0.5, or 1 with smooth_kernel. More helps uneven data. Default 0. */
+                                  chosen, two whole rings of neighbours, or three with smooth_kernel: 0.6 to 0.8 on a
+                                  surface, 1.8 in a volume, where half as many may not converge. Default 0. */
   batten_saddle_krylov krylov; /* Default AUTO. */
   unsigned iterations_max;     /* of one solve, above 0. Default 200. */
 } batten_saddle_options;
@@ -125,9 +126,10 @@ typedef struct batten_saddle_info {
 typedef struct batten_saddle batten_saddle;
 
 /* Bytes that factor and solve take at their peak, before anything is taken; SIZE_MAX on overflow. AUTO: as CHOLESKY.
- * ITERATIVE: with default options, without what the plans hold; some KB for each unknown.
- * A fall-back takes what its own method takes, where the memory limit has room for it.
- * Packed: about 4 N^2 (double) or 2 N^2 (mixed); LDL': 8 (N+k)^2; QR: 8 (N+k)^2. */
+ * ITERATIVE: with default options, without what the plans hold; some KB for each unknown, of unknowns on a surface:
+ * in a volume two to three times as much, which is checked before it is taken. A fall-back takes what its own method
+ * takes, where the memory limit has room for it. Packed: about 4 N^2 (double) or 2 N^2 (mixed); LDL': 8 (N+k)^2; QR:
+ * 8 (N+k)^2. */
 BATTEN_API size_t batten_saddle_bytes(batten_saddle_method method, size_t n, size_t k);
 
 /* Factors once; solve as often as wanted. matrix->user, matrix->p and the points of the sums must live as long as
