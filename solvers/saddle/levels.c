@@ -236,10 +236,13 @@ static size_t add_ring(const graph *g, size_t mark, size_t low, size_t count, si
  * restriction cuts through the large weights at the rim of a local solve, which leaves a far field, and those of all
  * domains add up: with half as many as own ones, 5 to 7 iterations on surfaces became 23 for 40,000 points of a cube,
  * and 90,000 did not converge; with two rings it is 6 there too, up to 300,000. r^3 takes a third one: 15 and 24
- * iterations became 9 and 10. Gives how many members there are. */
+ * iterations became 9 and 10; but not where unknowns share points, whose rings are thick. Gives how many members
+ * there are. */
 static size_t grow_domain(const graph *g, const batten_saddle_options *o, size_t mark, size_t own, size_t *member,
                           size_t *stamp) {
-  const int whole = o->overlap > 0 ? 0 : o->smooth_kernel ? SADDLE_RINGS_SMOOTH : SADDLE_RINGS;
+  const int whole = o->overlap > 0                             ? 0
+                    : o->smooth_kernel && g->k == SADDLE_GRAPH ? SADDLE_RINGS_SMOOTH
+                                                               : SADDLE_RINGS;
   const size_t most = own + saddle_added(own, SADDLE_OVERLAP_MAX);
   const size_t least = own + saddle_added(own, saddle_overlap_least(o));
   size_t count = own, ring = 0;
