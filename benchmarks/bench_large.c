@@ -230,12 +230,12 @@ static double exponent(const row *rows, size_t count) {
   return (n * xy - x * y) / (n * xx - x * x);
 }
 
+static const char *scene_name(const settings *s) {
+  return s->data ? s->data : s->cube ? "cube, seed 1" : "bumpy sphere, seed 1";
+}
+
 static void print_head(const settings *s, double accuracy) {
-  printf("\n%s, order %u, accuracy %g\n\n",
-         s->data   ? s->data
-         : s->cube ? "cube, seed 1"
-                   : "bumpy sphere, seed 1",
-         s->order, accuracy);
+  printf("\n%s, order %u, accuracy %g\n\n", scene_name(s), s->order, accuracy);
   printf(
       "| N | levels | set-up s | its 1e-3 / 1e-6 / 1e-9 (all) | s per product | solve s | set-up + solve s | grows "
       "as N^ "
@@ -381,9 +381,10 @@ int main(int argc, char **argv) {
   printf("batten %s, %u threads, BLAS: %s, %u threads\n", batten_version(), s.threads, blas, batten_blas_threads());
   if (json)
     fprintf(json,
-            "{\"batten\": \"%s\", \"threads\": %u, \"blas\": \"%s\", \"blas_threads\": %u, \"order\": %u,\n"
+            "{\"batten\": \"%s\", \"threads\": %u, \"blas\": \"%s\", \"blas_threads\": %u, \"order\": %u, "
+            "\"points\": \"%s\",\n"
             "  \"rows\": [",
-            batten_version(), s.threads, blas, batten_blas_threads(), s.order);
+            batten_version(), s.threads, blas, batten_blas_threads(), s.order, scene_name(&s));
   size_t told = 0;
   for (size_t q = 0; q < s.accuracy_count; q++) told += table(&s, s.accuracies[q], json, told);
   if (json) fprintf(json, "\n  ]}\n");

@@ -43,6 +43,7 @@ static bool measure(batten_context *ctx, const phobos *p, size_t n, const double
     batten_solid_options o = batten_solid_options_default();
     o.orientation = BATTEN_ORIENT_NEVER; /* the paper's method: the carrier alone */
     o.spline.loo_samples = 0;
+    o.spline.saddle.method = n < 2000 ? BATTEN_SADDLE_CHOLESKY : BATTEN_SADDLE_CHOLESKY_MIXED;
     batten_solid *solid = NULL;
     batten_solid_info info;
     batten_status status = batten_solid_fit(ctx, 3, n, p->points, &o, &solid, &info);

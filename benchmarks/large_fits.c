@@ -73,7 +73,7 @@ int main(int argc, char **argv) {
   double start = batten_now();
   batten_status status = batten_spline_fit(ctx, &d, &o, &s, &info);
   double fitted = batten_now();
-  double sums = fmin(fmax(0.01 * o.saddle.accuracy, 1e-12), 1e-3); /* what an iteration leaves shows */
+  double sums = fmin(fmax(0.01 * o.saddle.accuracy, 1e-12), 1e-3); /* finer than what an iteration leaves */
   if (status >= 0) status = values_at(ctx, s, sums, count, queries, places, out);
   double end = batten_now();
   if (status < 0) fprintf(stderr, "%s\n", batten_error(ctx));

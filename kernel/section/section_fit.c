@@ -85,7 +85,7 @@ static bool meets_another(const section_fit *s, const double *x, double distance
   return false;
 }
 
-static bool is_full(const section_fit *s) { return s->count + 3 > CENTERS_MAX; }
+static bool is_full(const section_fit *s) { return s->count + 3 >= CENTERS_MAX; }
 
 /* Room is there. */
 static void add(section_fit *s, const double *x, double value) {

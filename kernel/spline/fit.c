@@ -168,13 +168,17 @@ static batten_status fail_singular(const fit *t, const char *detail) {
 }
 
 /* From so many unknowns on iteration takes half the time of factors, and less with every point, for the kernels that
- * it takes easily: r, and r^2 ln r in the plane (benchmarks/bench_large). The times meet at some 2,500; its residual
- * is what saddle.accuracy asks for, not rounding, and there are no leave-one-out errors: not worth the first second.
- */
+ * it takes easily: r, and r^2 ln r in the plane (benchmarks/bench_large). Below that a factor takes a second at most,
+ * and gives residuals of rounding and leave-one-out errors besides. */
 enum { ITERATIVE_FROM = 6000 };
 
 /* Where no factor has room, iteration is tried from so many unknowns on, whatever the kernel. */
 enum { ITERATIVE_FROM_SMALL = 2000 };
+
+static bool dense_fits(const fit *t) {
+  return batten_saddle_bytes(BATTEN_SADDLE_CHOLESKY_MIXED, t->system.rows, t->system.basis.count) <=
+         batten_bytes_available(t->ctx);
+}
 
 static batten_saddle_method choose_method(const fit *t) {
   const spline_system *s = &t->system;
@@ -182,8 +186,7 @@ static batten_saddle_method choose_method(const fit *t) {
   if (asked != BATTEN_SADDLE_AUTO || !batten_spline_sums_exist(s->n) || s->rows < ITERATIVE_FROM_SMALL) return asked;
   const size_t available = batten_bytes_available(t->ctx);
   const bool easy = s->power <= 2 && s->rows >= ITERATIVE_FROM;
-  const bool dense_fits = batten_saddle_bytes(BATTEN_SADDLE_CHOLESKY_MIXED, s->rows, s->basis.count) <= available;
-  if (!easy && dense_fits) return asked;
+  if (!easy && dense_fits(t)) return asked;
   const size_t bytes = iterative_bytes(s->n, s->m, s->count, s->gradient_count, t->opt.saddle.accuracy);
   return bytes <= available ? BATTEN_SADDLE_ITERATIVE : asked;
 }
@@ -205,6 +208,12 @@ static batten_status solve(fit *t) {
     matrix.sums = &s->sums->calls;
   }
   st = batten_saddle_factor(t->ctx, &matrix, &o, &t->saddle);
+  if (st == BATTEN_E_TOO_LARGE && o.method != t->opt.saddle.method && dense_fits(t)) {
+    st = batten_expect(t->ctx, st, BATTEN_E_TOO_LARGE); /* chosen before the neighbours were known */
+    matrix.sums = NULL;
+    o.method = t->opt.saddle.method;
+    st = batten_saddle_factor(t->ctx, &matrix, &o, &t->saddle);
+  }
   if (st >= 0) st = batten_saddle_solve(t->ctx, t->saddle, t->f, t->w, t->c);
   if (st == BATTEN_E_SINGULAR) return fail_singular(t, batten_error(t->ctx));
   if (st >= 0) t->info.saddle = batten_saddle_get_info(t->saddle);

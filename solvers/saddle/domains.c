@@ -205,6 +205,7 @@ typedef struct factoring {
   const batten_saddle *s;
   const saddle_iterative *it;
   const saddle_level *level;
+  size_t slots;      /* tasks, as many as there are domains at most */
   size_t first, end; /* domains of this portion */
   bool again;        /* those alone that failed */
   char *work;
@@ -213,7 +214,7 @@ typedef struct factoring {
 
 static void factor_slot(void *arg, size_t slot) {
   const factoring *f = arg;
-  for (size_t i = f->first + slot; i < f->end; i += f->it->slots) {
+  for (size_t i = f->first + slot; i < f->end; i += f->slots) {
     saddle_domain *d = &f->level->domains[i];
     if (!f->again || d->failed) factor_domain(f->s, f->it, f->level, d, f->work + slot * f->work_bytes);
   }
@@ -245,7 +246,7 @@ static batten_status factor_portion(batten_saddle *s, factoring *f) {
     f->again = attempt > 0;
     batten_status st = take_memory(s, f);
     if (st < 0) return st;
-    batten_parallel(s->ctx, f->it->slots, factor_slot, f);
+    batten_parallel(s->ctx, f->slots, factor_slot, f);
     for (size_t i = f->end; i-- > f->first;)
       if (f->level->domains[i].failed) failed = i;
     if (failed == f->end) return BATTEN_OK;
@@ -260,35 +261,29 @@ static batten_status factor_portion(batten_saddle *s, factoring *f) {
   return BATTEN_OK;
 }
 
-/* Only now are the domains known: those of unknowns that fill a volume are larger than was foreseen. */
-static batten_status check_room(const batten_saddle *s, const saddle_iterative *it) {
-  const batten_la_real real = s->options.smooth_kernel ? BATTEN_LA_DOUBLE : BATTEN_LA_FLOAT;
-  const size_t available = batten_bytes_available(s->ctx);
-  size_t bytes = batten_saddle_domain_work(it->domain_most, s->matrix.k) * it->slots;
-  for (size_t q = 0; q < it->level_count; q++)
-    for (size_t d = 0; d < it->levels[q].domain_count; d++)
-      batten_add(bytes, batten_saddle_domain_bytes(real, it->levels[q].domains[d].count, s->matrix.k), &bytes);
-  if (bytes <= available) return BATTEN_OK;
-  return batten_fail(
-      s->ctx, BATTEN_E_TOO_LARGE,
-      "matrix.n: local solves of %zu rows with up to %zu neighbours take %zu bytes, the context has "
-      "%zu left; raise memory_limit, use fewer points, or give opt.overlap = %g, which may not converge",
-      s->matrix.n, it->domain_most, bytes, available, saddle_overlap_least(&s->options));
+/* Domains of a slot between two progress calls: some 0.1 s, of the large ones of a volume one at a time. */
+static size_t portion_of(size_t most) {
+  enum { PORTION = 16 };
+  const double whole = PORTION * pow(640 / (double)most, 3);
+  return whole < 1 ? 1 : whole < PORTION ? (size_t)whole : PORTION;
 }
 
 batten_status batten_saddle_domains_factor(batten_saddle *s, saddle_iterative *it) {
-  enum { PORTION = 16 }; /* domains of a slot between two progress calls: about 0.1 s */
-  size_t total = 0, done = 0;
+  size_t total = 0, done = 0, largest = 0;
   factoring f = {.s = s, .it = it, .work_bytes = batten_saddle_domain_work(it->domain_most, s->matrix.k)};
-  batten_status st = check_room(s, it);
-  for (size_t q = 0; q < it->level_count; q++) total += it->levels[q].domain_count;
-  if (st < 0 || total == 0) return st;
-  f.work = batten_alloc_array(s->ctx, it->slots, f.work_bytes);
+  batten_status st = BATTEN_OK;
+  for (size_t q = 0; q < it->level_count; q++) {
+    total += it->levels[q].domain_count;
+    if (it->levels[q].domain_count > largest) largest = it->levels[q].domain_count;
+  }
+  if (total == 0) return BATTEN_OK;
+  f.slots = it->slots < largest ? it->slots : largest;
+  f.work = batten_alloc_array(s->ctx, f.slots, f.work_bytes);
   if (!f.work) return BATTEN_E_NOMEM;
   for (size_t q = 0; q < it->level_count; q++) {
     f.level = &it->levels[q];
     for (f.first = 0; f.first < f.level->domain_count; f.first = f.end) {
-      size_t left = f.level->domain_count - f.first, most = PORTION * (size_t)it->slots;
+      size_t left = f.level->domain_count - f.first, most = portion_of(it->domain_most) * f.slots;
       f.end = f.first + (left < most ? left : most);
       st = batten_progress(s->ctx, "domains", (double)done / (double)total);
       if (st < 0) goto done;

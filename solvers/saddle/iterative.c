@@ -69,34 +69,61 @@ static size_t members_foreseen(const batten_saddle_options *o, size_t own) {
   return o->overlap > 0 || side * side < (double)least ? least : (size_t)(side * side);
 }
 
-/* m: for its sums, NULL: they take nothing. */
-static size_t bytes_with(const batten_saddle_matrix *m, const batten_saddle_options *o, batten_saddle_krylov krylov,
-                         unsigned slots, size_t n, size_t k) {
+/* What the domains of a level take. */
+typedef struct level_need {
+  size_t next, domains, members, most; /* unknowns of the next level; members of all domains, and of the largest */
+  size_t factors;                      /* bytes */
+} level_need;
+
+static level_need need_foreseen(const batten_saddle_options *o, batten_la_real real, size_t count, size_t k) {
+  level_need out = {.next = batten_saddle_parts(count, saddle_cell(count)) + SADDLE_EXTREMES,
+                    .domains = batten_saddle_parts(count, SADDLE_OWN_MAX)};
+  size_t own = count / out.domains + 1;
+  /* Domains have the size that halving gives, or twice that less one part where only some were too large. */
+  if (count / out.domains < SADDLE_OWN_MAX / 2) own = SADDLE_OWN_MAX;
+  out.most = members_foreseen(o, own);
+  batten_mul(out.domains, out.most, &out.members);
+  batten_mul(out.domains, batten_saddle_domain_bytes(real, out.most, k), &out.factors);
+  return out;
+}
+
+static level_need need_known(const saddle_level *l, batten_la_real real, size_t k) {
+  level_need out = {.next = l[1].count, .domains = l->domain_count};
+  for (size_t d = 0; d < l->domain_count; d++) {
+    const size_t members = l->domains[d].count;
+    if (members > out.most) out.most = members;
+    out.members += members;
+    batten_add(out.factors, batten_saddle_domain_bytes(real, members, k), &out.factors);
+  }
+  return out;
+}
+
+/* m: for its sums, NULL: they take nothing. cut: with the levels, NULL: as foreseen. */
+static size_t bytes_with(const batten_saddle_matrix *m, const batten_saddle_options *o, const saddle_iterative *cut,
+                         batten_saddle_krylov krylov, unsigned slots, size_t n, size_t k) {
   const batten_la_real real = o->smooth_kernel ? BATTEN_LA_DOUBLE : BATTEN_LA_FLOAT;
-  size_t count = n, held = sizeof(saddle_iterative), most = 0, cutting = 0;
+  size_t count = n, held = sizeof(saddle_iterative), most = 0, cutting = 0, largest = 0;
   if (n > SIZE_MAX / 4096) return SIZE_MAX;
   grow(&held, k * (k + 2), sizeof(double));
   grow(&held, batten_saddle_blocks(n) * SADDLE_DOTS, sizeof(double));
-  for (;;) {
+  for (size_t q = 0;; q++) {
     grow(&held, count, (k + 2) * sizeof(double) + 2 * sizeof(size_t));
     if (count <= SADDLE_EXACT_MAX) break;
-    size_t domains = batten_saddle_parts(count, SADDLE_OWN_MAX), own = count / domains + 1;
-    /* Domains have the size that halving gives, or twice that less one part where only some were too large. */
-    if (count / domains < SADDLE_OWN_MAX / 2) own = SADDLE_OWN_MAX;
-    size_t members = members_foreseen(o, own),
-           next = batten_saddle_parts(count, saddle_cell(count)) + SADDLE_EXTREMES;
-    grow(&held, domains, members * sizeof(size_t));
-    grow(&held, domains, sizeof(saddle_domain));
-    grow(&held, domains, batten_saddle_domain_bytes(real, members, k));
-    if (members > most) most = members;
+    const level_need need = cut ? need_known(&cut->levels[q], real, k) : need_foreseen(o, real, count, k);
+    grow(&held, need.members, sizeof(size_t));
+    grow(&held, need.domains, sizeof(saddle_domain));
+    batten_add(held, need.factors, &held);
+    if (need.most > most) most = need.most;
+    if (need.domains > largest) largest = need.domains;
     if (count == n) cutting = count * (6 * 3 + 7 + SADDLE_OVERLAP_MAX + SADDLE_GRAPH) * sizeof(double);
-    batten_add(held, plan_bytes(m, accuracy_within(o, n), count, next), &held);
-    count = next;
+    batten_add(held, plan_bytes(m, accuracy_within(o, n), count, need.next), &held);
+    count = need.next;
   }
   batten_add(held, plan_bytes(m, first_accuracy(o, n), n, n), &held);
   grow(&held, slots, batten_saddle_domain_scratch(most));
   size_t exact = batten_saddle_bytes(BATTEN_SADDLE_CHOLESKY, count, k < count ? k : 0), peak = cutting;
-  size_t work = slots * batten_saddle_domain_work(most, k), solving = 0;
+  size_t work, solving = 0;
+  batten_mul(batten_saddle_domain_work(most, k), slots < largest ? slots : largest, &work);
   grow(&solving, n, vectors(krylov) * sizeof(double));
   batten_add(solving, exact, &solving); /* its scratch is a part of that, and small */
   if (work > peak) peak = work;
@@ -110,17 +137,30 @@ size_t batten_saddle_iterative_bytes(const batten_saddle *s, size_t n, size_t k)
   const batten_saddle_matrix *m = s ? &s->matrix : NULL;
   const unsigned slots = s ? batten_workers(s->ctx) : 8;
   batten_saddle_krylov krylov = o.krylov == BATTEN_SADDLE_KRYLOV_AUTO ? BATTEN_SADDLE_FGMRES : o.krylov;
-  size_t bytes = bytes_with(m, &o, krylov, slots, n, k);
+  size_t bytes = bytes_with(m, &o, NULL, krylov, slots, n, k);
   if (s && o.krylov == BATTEN_SADDLE_KRYLOV_AUTO && bytes > batten_bytes_available(s->ctx))
-    bytes = bytes_with(m, &o, BATTEN_SADDLE_CG, slots, n, k);
+    bytes = bytes_with(m, &o, NULL, BATTEN_SADDLE_CG, slots, n, k);
   return bytes;
 }
 
-static bool takes_cg(const batten_saddle *s) {
-  if (s->options.krylov != BATTEN_SADDLE_KRYLOV_AUTO) return s->options.krylov == BATTEN_SADDLE_CG;
-  size_t wanted =
-      bytes_with(&s->matrix, &s->options, BATTEN_SADDLE_FGMRES, batten_workers(s->ctx), s->matrix.n, s->matrix.k);
-  return wanted > batten_bytes_available(s->ctx);
+/* Which iteration there is room for, now that the domains are known: those of unknowns that fill a volume are larger
+ * than was foreseen. before: bytes in use before the set-up. */
+static batten_status check_room(const batten_saddle *s, saddle_iterative *it, size_t before) {
+  const batten_saddle_options *o = &s->options;
+  const size_t n = s->matrix.n, k = s->matrix.k, taken = batten_bytes_in_use(s->ctx) - before;
+  batten_saddle_krylov krylov = o->krylov == BATTEN_SADDLE_KRYLOV_AUTO ? BATTEN_SADDLE_FGMRES : o->krylov;
+  size_t allowed, bytes = bytes_with(&s->matrix, o, it, krylov, it->slots, n, k);
+  batten_add(batten_bytes_available(s->ctx), taken, &allowed);
+  if (o->krylov == BATTEN_SADDLE_KRYLOV_AUTO && bytes > allowed) {
+    krylov = BATTEN_SADDLE_CG;
+    bytes = bytes_with(&s->matrix, o, it, krylov, it->slots, n, k);
+  }
+  it->fine_first = krylov == BATTEN_SADDLE_CG;
+  if (bytes <= allowed) return BATTEN_OK;
+  return batten_fail(s->ctx, BATTEN_E_TOO_LARGE,
+                     "matrix.n: %zu rows by iterative, whose local solves have up to %zu rows, take %zu bytes, the "
+                     "context allows %zu; raise memory_limit or use fewer points",
+                     n, it->domain_most, bytes, allowed);
 }
 
 /* ---- Set-up ---- */
@@ -173,7 +213,6 @@ batten_status batten_saddle_iterative_new(batten_saddle *s) {
   if (!it) return BATTEN_E_NOMEM;
   *it = (saddle_iterative){.code = batten_saddle_code(), .sums = *s->matrix.sums, .slots = batten_workers(s->ctx)};
   s->iterative = it;
-  it->fine_first = takes_cg(s);
   it->p_factor = batten_alloc_array(s->ctx, k * k, sizeof *it->p_factor);
   if (!it->p_factor) goto done;
   memset(it->p_factor, 0, k * k * sizeof *it->p_factor);
@@ -185,6 +224,8 @@ batten_status batten_saddle_iterative_new(batten_saddle *s) {
   if (!it->partial) goto done;
 
   st = batten_saddle_levels_new(s, it);
+  if (st < 0) goto done;
+  st = check_room(s, it, before);
   if (st < 0) goto done;
   st = batten_saddle_domains_factor(s, it);
   if (st < 0) goto done;
@@ -451,7 +492,7 @@ batten_status batten_saddle_iterative_solve(batten_saddle *s, const double *f, d
                      "residual: %.3g on %zu rows after %u iterations, above opt.accuracy %.3g; %s",
                      s->info.residual_rows, s->info.rows_checked, s->info.iterations, s->options.accuracy,
                      s->info.iterations >= s->options.iterations_max ? "raise opt.iterations_max"
-                                                                     : "add a nugget, or raise opt.overlap");
+                                                                     : "add a nugget, or give opt.overlap above 2");
 done:
   batten_free(s->ctx, v.f);
   batten_free(s->ctx, v.c);

@@ -214,7 +214,7 @@ static bool next_half(halves *h, size_t *low, size_t *high) {
 }
 
 /* Adds to a domain of `count` members what is next to members low .. count - 1 and not in it, up to `wanted` in all:
- * the nearest neighbour of each, then the second of each, and so on. Memory does as a rule not reach for all of a
+ * the nearest neighbour of each, then the second of each, and so on. An overlap that is asked for ends within a
  * ring, and an unknown at the rim that got nothing across it would be solved for as if the data ended there: with
  * one unknown's neighbours after the other's 40,000 points took 9 iterations instead of 5. */
 static size_t add_ring(const graph *g, size_t mark, size_t low, size_t count, size_t wanted, size_t *member,
@@ -231,13 +231,12 @@ static size_t add_ring(const graph *g, size_t mark, size_t low, size_t count, si
   return count;
 }
 
-/* A domain's members: its own, then ring by ring along the graph; the first rings are taken as a whole where the
- * overlap is chosen. Two are 0.7 times the own unknowns on a surface and 1.8 times in a volume. With less,
- * restriction cuts through the large weights at the rim of a local solve, which leaves a far field, and those of all
- * domains add up: with half as many as own ones, 5 to 7 iterations on surfaces became 23 for 40,000 points of a cube,
- * and 90,000 did not converge; with two rings it is 6 there too, up to 300,000. r^3 takes a third one: 15 and 24
- * iterations became 9 and 10; but not where unknowns share points, whose rings are thick. Gives how many members
- * there are. */
+/* A domain's members: its own, then ring by ring along the graph, the first rings whole where opt.overlap is 0. Two
+ * are 0.7 times the own unknowns on a surface and 1.8 times in a volume. With fewer, restriction cuts through the
+ * large weights at the rim of a local solve; the error that this leaves reaches far, and the errors of all domains
+ * add up: with overlap 0.5, enough on a surface, 40,000 points of a cube took 23 iterations and 90,000 did not
+ * converge; with two rings they take 6, as 300,000 do. r^3 needs a third ring there, 24 iterations became 10, but not
+ * where unknowns share points, whose rings are thick. Gives how many members there are. */
 static size_t grow_domain(const graph *g, const batten_saddle_options *o, size_t mark, size_t own, size_t *member,
                           size_t *stamp) {
   const int whole = o->overlap > 0                             ? 0

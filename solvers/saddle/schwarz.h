@@ -25,7 +25,7 @@ enum {
   SADDLE_OWN_MAX = 512,    /* unknowns of a domain without the overlap: the domains have 256 to 512 */
   SADDLE_CELL_MAX = 8,     /* unknowns of which one goes to the next level, see saddle_cell() */
   SADDLE_GRAPH = 10,       /* nearest neighbours along which the overlap grows */
-  SADDLE_RINGS = 2,        /* of these that are taken as a whole */
+  SADDLE_RINGS = 2,        /* rings of these that are taken whole */
   SADDLE_RINGS_SMOOTH = 3, /* with a smooth kernel */
   SADDLE_OVERLAP_MAX = 4,  /* times a domain's own unknowns */
   SADDLE_BLOCK = 16384,    /* entries of a vector that are summed up at a time */

@@ -147,7 +147,7 @@ static void test_invariance(batten_context *ctx) {
   batten_spline_info info = {0};
   batten_spline *first = fit(ctx, &d, &o, &info), *other;
   T_CHECK(info.saddle.levels > 1, "%u levels", info.saddle.levels);
-  T_RATIO(info.saddle.iterations, 12, "iterations to 1e-6");
+  T_RATIO(info.saddle.iterations, 7, "iterations to 1e-6");
   other = fit(ctx, &d, &o, NULL);
   T_CHECK(same_bits(first, other), "again: same bits");
   batten_spline_free(other);
@@ -268,7 +268,7 @@ static void test_choice(batten_context *ctx) {
   T_CHECK(info.saddle.method == BATTEN_SADDLE_ITERATIVE, "40,000 points: %s",
           batten_saddle_method_name(info.saddle.method));
   const unsigned *to = info.saddle.iterations_to;
-  T_CHECK(to[1] > 0 && to[1] <= 6 && to[2] > 0 && to[2] <= 10, "%u iterations to 1e-6, %u to 1e-9", to[1], to[2]);
+  T_CHECK(to[1] > 0 && to[1] <= 6 && to[2] > 0 && to[2] <= 8, "%u iterations to 1e-6, %u to 1e-9", to[1], to[2]);
   T_RATIO(info.saddle.residual_rows, 2e-9, "its residual");
   free_cloud(&c);
   c = make_cloud(3, 60000); /* in a volume local solves need three times the neighbours: 40,000 took 23 without */

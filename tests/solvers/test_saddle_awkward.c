@@ -48,21 +48,21 @@ static void test_awkward(batten_context *ctx) {
   for (size_t q = 0; q < sizeof types / sizeof *types; q++) {
     scene s = scene_new(types[q], KERNEL_R, N, 4, 7);
     for (size_t i = 0; i < N; i++) s.f[i] = sin((double)i * 0.01) + s.f[i] * 1e-3;
-    awkward(ctx, &s, 14, scene_names[types[q]]);
+    awkward(ctx, &s, 9, scene_names[types[q]]);
     scene_free(&s);
   }
   scene s = scene_new(SCENE_RANDOM, KERNEL_R, N, 4, 9);
   for (size_t i = 1; i < N; i += 20) /* 5 % twice, 1e-10 away */
     for (size_t a = 0; a < 3; a++) s.x[3 * i + a] = s.x[3 * i - 3 + a] + 1e-10 * (double)(a + 1);
   smooth_data(&s);
-  awkward(ctx, &s, 12, "pairs 1e-10 apart");
+  awkward(ctx, &s, 8, "pairs 1e-10 apart");
   scene_free(&s);
 
   s = scene_new(SCENE_RANDOM, KERNEL_R, N, 4, 10);
   smooth_data(&s);
   s.x[3 * 17] = 1e6;
   s.f[17] = 0;
-  awkward(ctx, &s, 14, "an outlier");
+  awkward(ctx, &s, 9, "an outlier");
   scene_free(&s);
 
   s = scene_new(SCENE_SPHERE, KERNEL_R, N, 4, 11); /* a thousandth of the spacing on a cap */
@@ -71,19 +71,19 @@ static void test_awkward(batten_context *ctx) {
     x[0] *= 1e-3, x[1] *= 1e-3, x[2] = sqrt(1 - x[0] * x[0] - x[1] * x[1]);
   }
   for (size_t i = 0; i < N; i++) s.f[i] = sin(3 * s.x[3 * i]) + s.x[3 * i + 1] * s.x[3 * i + 2];
-  awkward(ctx, &s, 9, "densities 1 : 1000");
+  awkward(ctx, &s, 7, "densities 1 : 1000");
   scene_free(&s);
 
   s = scene_new(SCENE_RANDOM, KERNEL_R, N, 4, 12); /* every domain is flat, or of few flats: P is singular there */
   for (size_t i = 0; i < N; i++) s.x[3 * i + i % 3] = s.x[3 * i + i % 3] < 0 ? -1 : 1;
   smooth_data(&s);
-  awkward(ctx, &s, 9, "a cube's faces");
+  awkward(ctx, &s, 7, "a cube's faces");
   scene_free(&s);
 
   s = scene_new(SCENE_RANDOM, KERNEL_R, N, 4, 13); /* lines */
   for (size_t i = 0; i < N; i++) s.x[3 * i + i % 3] = 0, s.x[3 * i + (i + 1) % 3] = 0.5;
   smooth_data(&s);
-  awkward(ctx, &s, 18, "three lines");
+  awkward(ctx, &s, 5, "three lines");
   scene_free(&s);
 }
 

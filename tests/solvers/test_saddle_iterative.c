@@ -190,6 +190,27 @@ static void test_exactness(batten_context *ctx) {
   scene_free(&s);
 }
 
+/* What is asked for: as much as may be, and none at all. */
+static void test_overlap(batten_context *ctx) {
+  enum { N = 3300 };
+  static const double overlaps[] = {4, 1e-3};
+  static const unsigned allowed[] = {5, 60};
+  scene s = scene_new(SCENE_RANDOM, KERNEL_R, N, 4, 5);
+  smooth_data(&s);
+  for (int q = 0; q < 2; q++) {
+    answer a = answer_new(N);
+    direct d = {0};
+    batten_saddle_options o = iterative_options(1e-6);
+    o.overlap = overlaps[q];
+    solve(ctx, &s, &d, &o, &a);
+    T_CHECK(a.status == BATTEN_OK, "overlap %g: %s", o.overlap, a.status ? batten_error(ctx) : "");
+    T_RATIO(a.info.iterations, allowed[q], "overlap %g: iterations", o.overlap);
+    T_RATIO(residual_of(&s, &a, a.c), 2e-6, "overlap %g: residual of all rows", o.overlap);
+    free(a.w);
+  }
+  scene_free(&s);
+}
+
 /* ---- Poor products ---- */
 
 static void test_products(batten_context *ctx) {
@@ -355,6 +376,7 @@ int main(int argc, char **argv) {
     test_marks(ctx, BATTEN_SADDLE_FGMRES);
     test_marks(ctx, BATTEN_SADDLE_CG);
     test_exactness(ctx);
+    test_overlap(ctx);
     test_products(ctx);
     test_starts(ctx);
     test_threads();

@@ -63,7 +63,8 @@ typedef struct batten_spline_info {
 } batten_spline_info;
 
 /* Bytes at the peak of a fit, predicted; SIZE_MAX on overflow. ITERATIVE: with default options, for points
- * on a surface; where they fill a volume two to three times as much, which a fit finds out before it takes it. */
+ * on a surface and the kernels r and r^2 ln r; in a volume, and for smoother kernels, two to six times as much, which a
+ * fit finds out before it takes it. */
 BATTEN_API size_t batten_spline_bytes(batten_saddle_method method, unsigned n, unsigned m, size_t points,
                                       size_t gradients);
 

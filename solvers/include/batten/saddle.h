@@ -92,9 +92,10 @@ typedef struct batten_saddle_options {
                                   accurate as that asks for. Misses are told by BATTEN_W_ACCURACY. Between 1e-13 and
                                   0.1. Default 1e-6. */
   double products_accuracy;    /* of the products at first, 0: chosen. Default 0. */
-  double overlap;              /* unknowns that a local solve takes in around its own, over its own, up to 4; 0:
-                                  chosen, two whole rings of neighbours, or three with smooth_kernel: 0.6 to 0.8 on a
-                                  surface, 1.8 in a volume, where half as many may not converge. Default 0. */
+  double overlap;              /* unknowns that a local solve takes in around its own, over its own, up to 4. 0: two
+                                  whole rings of neighbours, 0.6 to 0.8 on a surface and 1.8 in a volume, where 0.5
+                                  may not converge; with smooth_kernel three, where unknowns do not share points, 1.1
+                                  and 3.1. Default 0. */
   batten_saddle_krylov krylov; /* Default AUTO. */
   unsigned iterations_max;     /* of one solve, above 0. Default 200. */
 } batten_saddle_options;
@@ -126,10 +127,11 @@ typedef struct batten_saddle_info {
 typedef struct batten_saddle batten_saddle;
 
 /* Bytes that factor and solve take at their peak, before anything is taken; SIZE_MAX on overflow. AUTO: as CHOLESKY.
- * ITERATIVE: with default options, without what the plans hold; some KB for each unknown, of unknowns on a surface:
- * in a volume two to three times as much, which is checked before it is taken. A fall-back takes what its own method
- * takes, where the memory limit has room for it. Packed: about 4 N^2 (double) or 2 N^2 (mixed); LDL': 8 (N+k)^2; QR:
- * 8 (N+k)^2. */
+ * ITERATIVE: with default options, without what the plans hold; some KB for each unknown where they lie on a surface.
+ * In a volume, with smooth_kernel, or where unknowns share points it is two to six times as much: factor finds out
+ * when it knows the neighbours, before it takes it.
+ * A fall-back takes what its own method takes, where the memory limit has room for it.
+ * Packed: about 4 N^2 (double) or 2 N^2 (mixed); LDL': 8 (N+k)^2; QR: 8 (N+k)^2. */
 BATTEN_API size_t batten_saddle_bytes(batten_saddle_method method, size_t n, size_t k);
 
 /* Factors once; solve as often as wanted. matrix->user, matrix->p and the points of the sums must live as long as
