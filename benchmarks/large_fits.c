@@ -25,8 +25,8 @@ static double *read_all(const char *path, size_t *count) {
   return out;
 }
 
-/* Pairs of centre and place up to which values are summed directly, in a second or two: less than operators of fast
- * sums take to make. */
+/* Pairs of centre and place up to which values are summed directly, in some tenths of a second: less than operators
+ * of fast sums take to make. */
 static const double DIRECT_MOST = 3e8;
 
 static batten_status values_at(batten_context *ctx, batten_spline *s, double accuracy, size_t terms, size_t count,

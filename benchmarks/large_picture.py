@@ -100,8 +100,9 @@ def main():
     beyond = [dense[-1], (100000, dense[-1][1] * (1e5 / dense[-1][0]) ** slope(steep))]
     axes = Axes([line for line in (fast, dense, beyond, theirs) if line])
     accuracy = max(r["residual_rows"] for r in rows if len(r["levels"]) > 1)
+    points = figures.get("points", "bumpy sphere").split(",")[0]
     out = grid(axes, "The same global spline, two ways to fit it: time against points",
-               f"points of a {figures.get('points', 'bumpy sphere').split(',')[0]}, kernel r, {figures['threads']} threads; by iteration, residuals on 1000 rows summed "
+               f"points of a {points}, kernel r, {figures['threads']} threads; by iteration, residuals on 1000 rows summed "
                f"directly are at most {accuracy:.0e}")
     out += draw(axes, beyond, DENSE, 1.2, ' stroke-dasharray="5 5"')
     if theirs:

@@ -132,29 +132,32 @@ static size_t bytes_with(const batten_saddle_matrix *m, const batten_saddle_opti
   return held;
 }
 
+/* As bytes_with; *krylov AUTO becomes what has room within allowed: CG where FGMRES has none. */
+static size_t bytes_within(const batten_saddle_matrix *m, const batten_saddle_options *o, const saddle_iterative *cut,
+                           unsigned slots, size_t n, size_t k, size_t allowed, batten_saddle_krylov *krylov) {
+  const bool automatic = *krylov == BATTEN_SADDLE_KRYLOV_AUTO;
+  if (automatic) *krylov = BATTEN_SADDLE_FGMRES;
+  size_t bytes = bytes_with(m, o, cut, *krylov, slots, n, k);
+  if (!automatic || bytes <= allowed) return bytes;
+  *krylov = BATTEN_SADDLE_CG;
+  return bytes_with(m, o, cut, *krylov, slots, n, k);
+}
+
 size_t batten_saddle_iterative_bytes(const batten_saddle *s, size_t n, size_t k) {
   batten_saddle_options o = s ? s->options : batten_saddle_options_default();
-  const batten_saddle_matrix *m = s ? &s->matrix : NULL;
   const unsigned slots = s ? batten_workers(s->ctx) : 8;
-  batten_saddle_krylov krylov = o.krylov == BATTEN_SADDLE_KRYLOV_AUTO ? BATTEN_SADDLE_FGMRES : o.krylov;
-  size_t bytes = bytes_with(m, &o, NULL, krylov, slots, n, k);
-  if (s && o.krylov == BATTEN_SADDLE_KRYLOV_AUTO && bytes > batten_bytes_available(s->ctx))
-    bytes = bytes_with(m, &o, NULL, BATTEN_SADDLE_CG, slots, n, k);
-  return bytes;
+  const size_t allowed = s ? batten_bytes_available(s->ctx) : SIZE_MAX;
+  return bytes_within(s ? &s->matrix : NULL, &o, NULL, slots, n, k, allowed, &o.krylov);
 }
 
 /* Which iteration there is room for, now that the domains are known: those of unknowns that fill a volume are larger
  * than was foreseen. before: bytes in use before the set-up. */
 static batten_status check_room(const batten_saddle *s, saddle_iterative *it, size_t before) {
-  const batten_saddle_options *o = &s->options;
-  const size_t n = s->matrix.n, k = s->matrix.k, taken = batten_bytes_in_use(s->ctx) - before;
-  batten_saddle_krylov krylov = o->krylov == BATTEN_SADDLE_KRYLOV_AUTO ? BATTEN_SADDLE_FGMRES : o->krylov;
-  size_t allowed, bytes = bytes_with(&s->matrix, o, it, krylov, it->slots, n, k);
+  const size_t n = s->matrix.n, taken = batten_bytes_in_use(s->ctx) - before;
+  batten_saddle_krylov krylov = s->options.krylov;
+  size_t allowed;
   batten_add(batten_bytes_available(s->ctx), taken, &allowed);
-  if (o->krylov == BATTEN_SADDLE_KRYLOV_AUTO && bytes > allowed) {
-    krylov = BATTEN_SADDLE_CG;
-    bytes = bytes_with(&s->matrix, o, it, krylov, it->slots, n, k);
-  }
+  size_t bytes = bytes_within(&s->matrix, &s->options, it, it->slots, n, s->matrix.k, allowed, &krylov);
   it->fine_first = krylov == BATTEN_SADDLE_CG;
   if (bytes <= allowed) return BATTEN_OK;
   return batten_fail(s->ctx, BATTEN_E_TOO_LARGE,

@@ -287,6 +287,34 @@ static void test_choice(batten_context *ctx) {
   batten_spline_free(fit(ctx, &d, &o, &info));
   T_CHECK(info.saddle.method == BATTEN_SADDLE_CHOLESKY_MIXED && info.residual_max <= 1e-10, "5,999 points: %s, %.1e",
           batten_saddle_method_name(info.saddle.method), info.residual_max);
+  d.count = 3000;
+  batten_spline_free(fit(ctx, &d, &o, &info));
+  T_CHECK(info.saddle.method == BATTEN_SADDLE_CHOLESKY_MIXED && info.residual_max <= 1e-10, "3,000 points: %s",
+          batten_saddle_method_name(info.saddle.method));
+  free_cloud(&c);
+}
+
+/* In a volume iteration turns out too large when the neighbours are known, the more the more threads there are: what
+ * was chosen for two threads is a factor for 32. */
+static void test_no_room(void) {
+  cloud c = make_cloud(3, 7000);
+  batten_spline_data d = data_of(&c, false);
+  batten_spline_options o = options_of(2, BATTEN_SADDLE_AUTO, 1e-6);
+  for (unsigned threads = 2; threads <= 32; threads += 30) {
+    batten_context_options limited = batten_context_options_default();
+    limited.memory_limit = 200000000;
+    limited.threads = threads;
+    batten_context *ctx = NULL;
+    batten_spline_info info = {0};
+    T_CHECK(batten_context_new(&limited, &ctx) == BATTEN_OK, "a context");
+    batten_spline_free(fit(ctx, &d, &o, &info));
+    const batten_saddle_method expected = threads > 2 ? BATTEN_SADDLE_CHOLESKY_MIXED : BATTEN_SADDLE_ITERATIVE;
+    T_CHECK(info.saddle.method == expected && *batten_error(ctx) == 0, "%u threads in 200 MB: %s%s", threads,
+            batten_saddle_method_name(info.saddle.method), batten_error(ctx));
+    T_CHECK(batten_bytes_peak(ctx) <= limited.memory_limit && batten_bytes_in_use(ctx) == 0, "at most %.3g MB",
+            (double)batten_bytes_peak(ctx) * 1e-6);
+    batten_context_free(ctx);
+  }
   free_cloud(&c);
 }
 
@@ -372,6 +400,7 @@ int main(void) {
   test_evaluator(ctx, 2, 2, false, 1e-8);
   test_evaluator(ctx, 3, 3, true, 1e-6);
   test_choice(ctx);
+  test_no_room();
   test_bytes(ctx);
   test_bad(ctx);
   test_missed(ctx);
